@@ -1,0 +1,9 @@
+// Built-in styles: guides grown over the mannequin. Deterministic: no libm but sqrt, fabs, floor.
+#pragma once
+
+#include "messages/hairstyle.h"
+
+// A finished style (guides, scalp triangles, one grown set per section, colliders, box), or NULL
+// with a fault. Names: load_builtin_styles.
+Hairstyle* groom_long(Fault* fault);
+Hairstyle* groom_bob(Fault* fault);

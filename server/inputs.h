@@ -1,0 +1,28 @@
+// Messages waiting for the next tick boundary: bounded, in order of arrival.
+#pragma once
+
+#include "messages/control.h"
+
+#define INPUTS_MAX       256
+#define INPUTS_MAX_BYTES 256 // of a queued message; poses and characters are smaller
+
+typedef enum InputKind { INPUT_POSE, INPUT_CHARACTER } InputKind;
+
+typedef struct Input {
+    InputKind kind;
+    union {
+        PoseMessage pose;
+        CharacterMessage character;
+    };
+    size_t size;
+    uint8_t bytes[INPUTS_MAX_BYTES]; // as they came: what applied_t repeats
+} Input;
+
+typedef struct Inputs {
+    Input queue[INPUTS_MAX];
+    int count;
+} Inputs;
+
+// False where the queue is full. A pose then takes the place of the newest waiting pose of its
+// slot: a head's latest place matters more than its way there.
+bool inputs_push(Inputs* inputs, const Input* input);

@@ -1,0 +1,586 @@
+// hair-server: simulates hair and publishes its guides. This file is the command line, the clock
+// and the signals; what happens in a tick is in daemon.c.
+#include "messages/channels.h"
+#include "messages/link.h"
+#include "messages/log.h"
+#include "server/daemon.h"
+#include "server/load.h"
+#include "server/motion.h"
+
+#include <argp.h>
+#include <inttypes.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define EXIT_USAGE 2
+#define SLICES     4 // guides go out in so many portions a tick: a burst overruns socket buffers
+
+const char* argp_program_version = "hair-server (strandcast) " STRANDCAST_VERSION;
+
+typedef struct Options {
+    DaemonOptions daemon;
+    const char* url;
+    const char* record;
+    int64_t ticks; // 0: until stopped
+    bool overwrite, hash, info, quiet, verbose;
+    bool scene_only; // first of two passes over the command line
+    Fault fault;
+} Options;
+
+enum {
+    KEY_SCENE = 256,
+    KEY_STYLE,
+    KEY_HEAD,
+    KEY_UNIT,
+    KEY_KEEP_AXES,
+    KEY_GUIDES,
+    KEY_NODES,
+    KEY_BOTH_ENDS,
+    KEY_INFO,
+    KEY_CHARACTERS,
+    KEY_MOTION,
+    KEY_MODEL,
+    KEY_RATE,
+    KEY_SUBSTEPS,
+    KEY_ITERATIONS,
+    KEY_STIFFNESS,
+    KEY_DAMPING,
+    KEY_GRAVITY,
+    KEY_THREADS,
+    KEY_PROJECT,
+    KEY_URL,
+    KEY_MTU,
+    KEY_TICKS,
+    KEY_FAST,
+    KEY_EPOCH,
+    KEY_RECORD,
+    KEY_OVERWRITE,
+    KEY_HASH,
+};
+
+static const struct argp_option option_table[] = {
+    {NULL, 0, NULL, 0, "What is simulated:", 1},
+    {"scene", KEY_SCENE, "FILE", 0, "Styles, characters and physics from a JSON scene", 1},
+    {"style", KEY_STYLE, "NAME|FILE", 0,
+     "A built-in style, a .json style, or .tfx sections (repeat for each section); default long",
+     1},
+    {"head", KEY_HEAD, "FILE", 0, "Head mesh (.obj) of a .tfx groom", 1},
+    {"unit", KEY_UNIT, "M", 0, "Metres per unit of the groom's files", 1},
+    {"keep-axes", KEY_KEEP_AXES, NULL, 0, "Do not mirror z of .tfx version 3", 1},
+    {"guides", KEY_GUIDES, "N", 0, "Guide strands of an imported groom (64)", 1},
+    {"nodes", KEY_NODES, "N", 0, "Nodes of a guide strand of an imported groom (8)", 1},
+    {"both-ends", KEY_BOTH_ENDS, "auto|none|NAMES", 0, "Which sections keep both ends on the head",
+     1},
+    {"characters", KEY_CHARACTERS, "N", 0, "Slots 0 to N-1 wear the first style (1)", 1},
+    {"info", KEY_INFO, NULL, 0, "Print the loaded style and exit", 1},
+    {NULL, 0, NULL, 0, "How it moves:", 2},
+    {"motion", KEY_MOTION, "NAME", 0,
+     "none, bus (default), nod, shake, run, turn or teleport; bus obeys " CHANNEL_POSE, 2},
+    {"model", KEY_MODEL, "spring", 0, "Model of the strands", 2},
+    {"rate", KEY_RATE, "HZ", 0, "Ticks a second (60)", 2},
+    {"substeps", KEY_SUBSTEPS, "N", 0, "Steps of a tick (4)", 2},
+    {"iterations", KEY_ITERATIONS, "N", 0, "Length corrections of a substep (1)", 2},
+    {"stiffness", KEY_STIFFNESS, "S2", 0, "k/m at the root, 1/s^2 (1600); falls to the tip", 2},
+    {"damping", KEY_DAMPING, "S", 0, "Decay of velocity relative to the head, 1/s (8)", 2},
+    {"gravity", KEY_GRAVITY, "on|off", 0,
+     "on: rest is where gravity pulls from; off (default): gravity is compensated at rest", 2},
+    {"threads", KEY_THREADS, "N", 0, "Threads; the result does not depend on it (1)", 2},
+    {"project", KEY_PROJECT, "on|off", 0, "Publish links at their exact lengths (on)", 2},
+    {NULL, 0, NULL, 0, "Where it goes:", 3},
+    {"url", KEY_URL, "URL", 0, "LCM bus (LCM_DEFAULT_URL, else this host only)", 3},
+    {"mtu", KEY_MTU, "BYTES", 0, "Largest IP packet (1500)", 3},
+    {"ticks", KEY_TICKS, "N", 0, "Stop after N ticks", 3},
+    {"fast", KEY_FAST, NULL, 0, "Do not wait for the clock", 3},
+    {"epoch", KEY_EPOCH, "E", 0, "Fix the epoch, us", 3},
+    {"record", KEY_RECORD, "FILE", 0, "Write an LCM log; with --fast no network is opened", 3},
+    {"overwrite", KEY_OVERWRITE, NULL, 0, "Let --record replace a file", 3},
+    {"hash", KEY_HASH, NULL, 0, "Print the hash of the state at the end", 3},
+    {"quiet", 'q', NULL, 0, "Faults only", 3},
+    {"verbose", 'v', NULL, 0, "At the end, what was sent, dropped, refused", 3},
+    {0},
+};
+
+static const char documentation[] =
+    "Simulates guide strands of hair and publishes them on LCM.\v"
+    "Examples:\n"
+    "  hair-server                              long hair, 60 Hz, this host\n"
+    "  hair-server --motion shake               a head that shakes\n"
+    "  hair-server --style bob --motion bus     a head moved by " CHANNEL_POSE " messages\n"
+    "  hair-server --style tail.tfx --style top.tfx --head head.obj --info\n"
+    "  hair-server --motion nod --ticks 240 --fast --record nod.lcmlog\n"
+    "  hair-server --motion shake --ticks 600 --fast --hash\n"
+    "Exit status: 0 fine, 1 failed, 2 wrong usage.";
+
+static double number(struct argp_state* state, const char* name, const char* text, double low,
+                     double high)
+{
+    char* end;
+    double value = strtod(text, &end);
+    if (end == text || *end != '\0' || !(value >= low && value <= high))
+        argp_error(state, "--%s %s: must be a number from %g to %g", name, text, low, high);
+    return value;
+}
+
+static int64_t whole(struct argp_state* state, const char* name, const char* text, int64_t low,
+                     int64_t high)
+{
+    char* end;
+    long long value = strtoll(text, &end, 10);
+    if (end == text || *end != '\0' || value < low || value > high)
+        argp_error(state, "--%s %s: must be a whole number from %" PRId64 " to %" PRId64, name,
+                   text, low, high);
+    return value;
+}
+
+static bool on_off(struct argp_state* state, const char* name, const char* text)
+{
+    if (strcmp(text, "on") != 0 && strcmp(text, "off") != 0)
+        argp_error(state, "--%s %s: must be on or off", name, text);
+    return strcmp(text, "on") == 0;
+}
+
+static void parse_style(struct argp_state* state, LoadOptions* load, const char* text)
+{
+    if (load->style_count == LOAD_MAX_FILES)
+        argp_error(state, "--style: at most %d files", LOAD_MAX_FILES);
+    else
+        load->styles[load->style_count++] = text;
+}
+
+static error_t parse_what(int key, char* text, struct argp_state* state)
+{
+    Options* options = state->input;
+    LoadOptions* load = &options->daemon.load;
+    switch (key) {
+    case KEY_SCENE:
+        break; // the first pass has read it
+    case KEY_STYLE:
+        parse_style(state, load, text);
+        break;
+    case KEY_HEAD:
+        load->head = text;
+        break;
+    case KEY_UNIT:
+        load->unit_m = number(state, "unit", text, 1e-6, 1000);
+        break;
+    case KEY_KEEP_AXES:
+        load->keep_axes = true;
+        break;
+    case KEY_GUIDES:
+        load->guides = (int)whole(state, "guides", text, 1, HAIRSTYLE_MAX_GUIDES);
+        break;
+    case KEY_NODES:
+        load->nodes = (int)whole(state, "nodes", text, HAIRSTYLE_MIN_NODES, HAIRSTYLE_MAX_NODES);
+        break;
+    case KEY_BOTH_ENDS:
+        load->both_ends = text;
+        break;
+    case KEY_CHARACTERS:
+        options->daemon.characters = (int)whole(state, "characters", text, 0, CHANNEL_MAX_SLOTS);
+        break;
+    case KEY_INFO:
+        options->info = true;
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+static error_t parse_how(int key, char* text, struct argp_state* state)
+{
+    Options* options = state->input;
+    SimDefinition* sim = &options->daemon.sim;
+    switch (key) {
+    case KEY_MOTION:
+        options->daemon.motion = text;
+        if (motion_find(text) == NULL)
+            argp_error(state, "--motion %s: must be none, bus, nod, shake, run, turn or teleport",
+                       text);
+        break;
+    case KEY_MODEL:
+        if (strcmp(text, "spring") != 0)
+            argp_error(state, "--model %s: only spring is there so far", text);
+        break;
+    case KEY_RATE:
+        sim->rate_hz = number(state, "rate", text, 1, 1000);
+        break;
+    case KEY_SUBSTEPS:
+        sim->substeps = (int)whole(state, "substeps", text, 1, 64);
+        break;
+    case KEY_ITERATIONS:
+        sim->iterations = (int)whole(state, "iterations", text, 0, 64);
+        break;
+    case KEY_STIFFNESS:
+        sim->stiffness_s2 = (float)number(state, "stiffness", text, 0, 1e6);
+        break;
+    case KEY_DAMPING:
+        sim->damping_per_s = (float)number(state, "damping", text, 0, 1e4);
+        break;
+    case KEY_GRAVITY:
+        sim->gravity_compensation = !on_off(state, "gravity", text);
+        break;
+    case KEY_THREADS:
+        sim->threads = (int)whole(state, "threads", text, 1, 256);
+        break;
+    case KEY_PROJECT:
+        options->daemon.project = on_off(state, "project", text);
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+static error_t parse_where(int key, char* text, struct argp_state* state)
+{
+    Options* options = state->input;
+    switch (key) {
+    case KEY_URL:
+        options->url = text;
+        break;
+    case KEY_MTU:
+        options->daemon.mtu = (int)whole(state, "mtu", text, 576, 65000);
+        break;
+    case KEY_TICKS:
+        options->ticks = whole(state, "ticks", text, 1, INT32_MAX);
+        break;
+    case KEY_FAST:
+        options->daemon.fast = true;
+        break;
+    case KEY_EPOCH:
+        options->daemon.epoch = whole(state, "epoch", text, 1, INT64_MAX - 1);
+        break;
+    case KEY_RECORD:
+        options->record = text;
+        break;
+    case KEY_OVERWRITE:
+        options->overwrite = true;
+        break;
+    case KEY_HASH:
+        options->hash = true;
+        break;
+    case 'q':
+        options->quiet = true;
+        break;
+    case 'v':
+        options->verbose = true;
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+static void check_together(const Options* options, struct argp_state* state)
+{
+    if (options->daemon.scene != NULL && options->daemon.load.style_count > 0)
+        argp_error(state,
+                   "--style and --scene: a scene names its own styles; choose one of the two");
+    if (options->daemon.scene != NULL && load_has_groom_options(&options->daemon.load))
+        argp_error(state, "--scene: what grooms are made of stands in the scene's styles");
+    if (options->daemon.scene != NULL && options->info)
+        argp_error(state, "--info is of a --style, not of a --scene");
+    if (options->overwrite && options->record == NULL)
+        argp_error(state, "--overwrite needs --record FILE");
+    if (options->hash && options->ticks == 0)
+        argp_error(state, "--hash needs --ticks N: otherwise there is no end to hash");
+    if (options->daemon.fast && options->ticks == 0 && options->record != NULL)
+        argp_error(state, "--fast --record needs --ticks N: otherwise the disk fills");
+}
+
+static error_t parse(int key, char* text, struct argp_state* state)
+{
+    Options* options = state->input;
+    if (key == ARGP_KEY_ARG)
+        argp_error(state, "\"%s\" is not an option; did you mean --style %s?", text, text);
+    if (options->scene_only) {
+        if (key == KEY_SCENE) options->daemon.scene = text;
+        return 0;
+    }
+    if (key == ARGP_KEY_END) check_together(options, state);
+    if (parse_what(key, text, state) == 0 || parse_how(key, text, state) == 0) return 0;
+    return parse_where(key, text, state);
+}
+
+// Twice: the scene is read between the passes, so that options win over it wherever they stand.
+static bool read_options(Options* options, int argc, char** argv)
+{
+    const struct argp argp = {option_table, parse, NULL, documentation, NULL, NULL, NULL};
+    argp_err_exit_status = EXIT_USAGE;
+    options->daemon = daemon_default();
+    options->scene_only = true;
+    argp_parse(&argp, argc, argv, 0, NULL, options);
+    const char* scene = options->daemon.scene;
+    if (scene != NULL && !daemon_use_scene(&options->daemon, scene, &options->fault)) return false;
+    options->scene_only = false;
+    argp_parse(&argp, argc, argv, 0, NULL, options);
+    return true;
+}
+
+// Running ----------------------------------------------------------------------------------------
+
+typedef struct Server {
+    const Options* options;
+    Daemon* daemon;
+    Link* link;
+    LogWriter* log;
+    bool failed;       // a fault was said
+    bool has_progress; // a line without its end stands on the terminal
+    bool told_slow;
+    int64_t send_failures;
+} Server;
+
+static volatile sig_atomic_t stop_requested;
+
+static void request_stop(int signal)
+{
+    (void)signal;
+    stop_requested = 1;
+}
+
+static void catch_signals(void)
+{
+    struct sigaction action = {.sa_handler = request_stop, .sa_flags = SA_RESETHAND};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+static void say_error(Server* server, const char* text)
+{
+    if (server != NULL && server->has_progress) fputc('\n', stderr);
+    if (server != NULL) server->has_progress = false;
+    fprintf(stderr, "hair-server: %s\n", text);
+}
+
+static void say_notice(void* context, const char* text)
+{
+    say_error(context, text);
+}
+
+static void send_to_bus(void* context, int64_t utime, const char* channel, const uint8_t* bytes,
+                        size_t size)
+{
+    Server* server = context;
+    (void)utime;
+    if (link_publish(server->link, channel, bytes, size)) return;
+    if (server->send_failures++ == 0)
+        say_error(server, "the bus does not take a message; is the network up? (said once)");
+}
+
+static void write_to_log(void* context, int64_t utime, const char* channel, const uint8_t* bytes,
+                         size_t size)
+{
+    Server* server = context;
+    Fault fault;
+    if (server->failed || log_write(server->log, utime, channel, bytes, size, &fault)) return;
+    say_error(server, fault.text);
+    server->failed = true;
+}
+
+static void hear(void* context, const char* channel, const uint8_t* bytes, size_t size)
+{
+    daemon_receive(((Server*)context)->daemon, channel, bytes, size);
+}
+
+static bool open_bus(Server* server, Fault* fault)
+{
+    static const char* const heard[] = {CHANNEL_POSE, CHANNEL_CHARACTER, CHANNEL_REQUEST,
+                                        CHANNEL_STATUS};
+    server->link = link_open(server->options->url, fault);
+    if (server->link == NULL) return false;
+    for (size_t i = 0; i < sizeof heard / sizeof heard[0]; ++i)
+        if (!link_subscribe(server->link, heard[i], hear, server, fault)) return false;
+    daemon_add_sink(server->daemon, (DaemonSink){send_to_bus, server});
+    return true;
+}
+
+static bool open_outputs(Server* server, Fault* fault)
+{
+    const Options* options = server->options;
+    if (options->record != NULL) {
+        server->log = log_create(options->record, options->overwrite, fault);
+        if (server->log == NULL) return false;
+        daemon_add_sink(server->daemon, (DaemonSink){write_to_log, server});
+    }
+    bool is_offline = options->daemon.fast && (options->record != NULL || options->hash);
+    return (is_offline && options->url == NULL) || open_bus(server, fault);
+}
+
+static void say_ready(const Server* server)
+{
+    DaemonStatus status = daemon_status(server->daemon);
+    const char* url = server->options->url != NULL ? server->options->url : "";
+    if (*url == '\0' && getenv("LCM_DEFAULT_URL") != NULL) url = getenv("LCM_DEFAULT_URL");
+    if (*url == '\0') url = "this host";
+    if (server->options->quiet) return;
+    printf("ready: epoch %" PRId64 ", %g Hz, %d character%s, style %s %dx%d, %s\n",
+           daemon_epoch(server->daemon), daemon_rate_hz(server->daemon), status.characters,
+           status.characters == 1 ? "" : "s", status.style, status.guides, status.nodes,
+           server->link != NULL ? url : "no network");
+    fflush(stdout);
+}
+
+static void say_progress(Server* server)
+{
+    if (server->options->quiet || !isatty(STDERR_FILENO)) return;
+    DaemonStatus status = daemon_status(server->daemon);
+    fprintf(stderr, "\rtick %d, %.2f ms a tick, %" PRId64 " dropped, %.1f MB sent\033[K",
+            daemon_tick_number(server->daemon), status.step_us * 1e-3, status.overruns,
+            (double)status.sent_bytes * 1e-6);
+    server->has_progress = true;
+}
+
+// Hears the bus until the monotonic clock reads `when_us`.
+static void listen_until(Server* server, int64_t when_us)
+{
+    while (!stop_requested) {
+        int64_t left = when_us - base_monotonic_us();
+        if (server->link == NULL) {
+            if (left > 0) base_sleep_until_us(when_us);
+            return;
+        }
+        if (left < 0) left = 0;
+        struct timespec wait = {left / 1000000, left % 1000000 * 1000};
+        struct pollfd ready = {.fd = link_fileno(server->link), .events = POLLIN};
+        if (ppoll(&ready, 1, &wait, NULL) <= 0) return;
+        if (link_handle(server->link, 0) < 0) {
+            say_error(server, "the bus is dead");
+            server->failed = true;
+            return;
+        }
+        if (left == 0) return; // one helping once the time is up: a flood must not stop the ticks
+    }
+}
+
+static bool goes_on(const Server* server, int64_t done)
+{
+    int64_t ticks = server->options->ticks;
+    return !stop_requested && !server->failed && (ticks == 0 || done < ticks);
+}
+
+static void run_fast(Server* server)
+{
+    int64_t tick_us = (int64_t)(1e6 / daemon_rate_hz(server->daemon));
+    for (int64_t done = 0; goes_on(server, done); ++done) {
+        if (server->link != NULL) listen_until(server, 0);
+        daemon_tick(server->daemon);
+        if (done == 0) daemon_publish_styles(server->daemon);
+        daemon_publish_slice(server->daemon, 0, 1);
+        daemon_publish_background(server->daemon, tick_us);
+        if (done % 600 == 599) say_progress(server);
+    }
+}
+
+// Once: a hiccup drops a few ticks, a machine that is too slow goes on and on.
+static void tell_slow(Server* server, double elapsed_s)
+{
+    int64_t dropped = daemon_status(server->daemon).overruns;
+    double due = elapsed_s * daemon_rate_hz(server->daemon);
+    if (server->told_slow || server->options->quiet || elapsed_s < 2.0 ||
+        (double)dropped < 0.1 * due)
+        return;
+    server->told_slow = true;
+    char text[160];
+    snprintf(text, sizeof text,
+             "too slow here: %" PRId64 " of %.0f ticks dropped so far; fewer "
+             "characters, substeps or Hz",
+             dropped, due);
+    say_notice(server, text);
+}
+
+// Ticks whose time has passed before they began are dropped and counted: they would only be
+// followed by more that are late.
+static int64_t drop_late_ticks(Server* server, int64_t tick_us, double* due_us)
+{
+    int64_t late = (int64_t)(((double)base_monotonic_us() - *due_us) / (double)tick_us);
+    if (late < 1) return 0;
+    *due_us += (double)(late * tick_us);
+    daemon_count_overrun(server->daemon, (int)late);
+    return late;
+}
+
+static void run_paced(Server* server)
+{
+    double exact_us = 1e6 / daemon_rate_hz(server->daemon);
+    double start_us = (double)base_monotonic_us(), due_us = start_us, said_us = start_us;
+    for (int64_t done = 0; goes_on(server, done); ++done) {
+        daemon_tick(server->daemon);
+        if (done == 0 && server->log != NULL)
+            daemon_record_styles(server->daemon, (DaemonSink){write_to_log, server});
+        for (int slice = 0; slice < SLICES && !stop_requested; ++slice) {
+            listen_until(server, (int64_t)(due_us + exact_us * slice / SLICES));
+            daemon_publish_slice(server->daemon, slice, SLICES);
+        }
+        daemon_publish_background(server->daemon, (int64_t)exact_us);
+        if (due_us - said_us >= 1e6) {
+            say_progress(server);
+            tell_slow(server, (due_us - start_us) * 1e-6);
+            said_us = due_us;
+        }
+        due_us += exact_us;
+        listen_until(server, (int64_t)due_us);
+        drop_late_ticks(server, (int64_t)exact_us, &due_us);
+    }
+}
+
+static void finish(Server* server)
+{
+    Fault fault;
+    if (server->log != NULL && !log_finish(server->log, &fault) && !server->failed) {
+        say_error(server, fault.text);
+        server->failed = true;
+    }
+    if (server->has_progress) fputc('\n', stderr);
+    server->has_progress = false;
+    link_close(server->link);
+    if (server->options->verbose && server->daemon != NULL) {
+        DaemonStatus status = daemon_status(server->daemon);
+        fprintf(stderr,
+                "hair-server: %" PRId64 " messages, %" PRId64 " bytes, %" PRId64
+                " ticks dropped, %" PRId64 " inputs refused, %" PRId64 " coordinates clamped\n",
+                status.sent_messages, status.sent_bytes, status.overruns, status.rejected,
+                status.clamped);
+    }
+}
+
+static int serve(Options* options)
+{
+    Server server = {.options = options};
+    Fault fault;
+    DaemonOptions daemon = options->daemon; // a copy: its notice points at this call's server
+    if (!options->quiet) daemon.notice = (Notice){say_notice, &server};
+    LoadOptions* load = &daemon.load;
+    if (options->info && load->style_count == 0)
+        load->styles[load->style_count++] = load_builtin_styles[0];
+    if (options->info)
+        return load_print_info(load, &daemon.notice, &options->fault) ? EXIT_SUCCESS : EXIT_FAILURE;
+    server.daemon = daemon_create(&daemon, &options->fault);
+    if (server.daemon == NULL) return EXIT_FAILURE;
+    if (open_outputs(&server, &fault)) {
+        say_ready(&server);
+        (options->daemon.fast ? run_fast : run_paced)(&server);
+    } else {
+        say_error(&server, fault.text);
+        server.failed = true;
+    }
+    finish(&server);
+    if (options->hash && !server.failed)
+        printf("hash %016" PRIx64 "\n", daemon_state_hash(server.daemon));
+    daemon_destroy(server.daemon);
+    return server.failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
+
+int main(int argc, char** argv)
+{
+    static Options options;
+    catch_signals();
+    int status = read_options(&options, argc, argv) ? serve(&options) : EXIT_FAILURE;
+    if (options.fault.text[0] != '\0') say_error(NULL, options.fault.text);
+    return status;
+}

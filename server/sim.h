@@ -1,0 +1,67 @@
+// The strand simulation as a library: definition in, guide positions out. Knows nothing of heads,
+// styles or messages; a cantilever or a pendulum is just another definition.
+//
+// State is relative to the head's position and along world axes, so a head 100 km away costs no
+// precision, a carried (teleported) head touches no float, and the head's motion enters as the
+// second difference of its position. Layout: blocks of 16 strands, structure of arrays, lanes
+// across strands (strands.h), so that every loop over lanes is one vector instruction wide.
+// Bit-identical over thread counts, optimisation levels and compilers (-ffp-contract=off).
+#pragma once
+
+#include "messages/base.h"
+#include "messages/vec.h"
+
+typedef struct Sim Sim;
+
+// What is simulated and how. Start from sim_default().
+typedef struct SimDefinition {
+    int strands, nodes; // nodes of every strand, node 0 the root
+    const Vec3* rest;   // [strand][node], head space, m; copied
+    const uint8_t*
+        weight; // [strand][node], 255 physics ... 0 skinned; NULL: all physics but node 0
+    const Sphere* colliders; // head space; copied
+    int collider_count;
+    double rate_hz;       // ticks a second
+    int substeps;         // of a tick
+    int iterations;       // length-correction sweeps a substep
+    float gravity_m_s2;   // along -Y
+    float stiffness_s2;   // k/m of the first node, 1/s^2
+    float fall_off_per_m; // c in k(L) = k / max(1, c L)^a, L m from the root (thesis 5.9, mended)
+    int fall_off_power;   // a: 0 none, 1 linear, 2 quadratic, 3 cubic
+    float damping_per_s;  // velocity relative to the head decays as exp(-damping t)
+    float pearl_radius_m; // every node collides as a sphere of this radius (Nalu 23.2.2)
+    bool gravity_compensation; // rest is equilibrium under gravity at every tilt
+    int threads;               // OpenMP threads over blocks; result does not depend on it
+} SimDefinition;
+
+SimDefinition sim_default(void);
+
+// NULL with a fault naming the field that is out of range.
+Sim* sim_create(const SimDefinition* definition, Fault* fault);
+void sim_destroy(Sim* sim);
+
+// The head at the end of one substep, relative to the state's origin.
+typedef struct SimHead {
+    float rotation[9];      // row-major: world = rotation * head
+    Vec3 second_difference; // x(t+dt) - 2 x(t) + x(t-dt) of the head's position, m, world axes
+} SimHead;
+
+// Advances one tick; `heads` has one entry per substep. Allocates nothing.
+void sim_step(Sim* sim, const SimHead* heads);
+
+// Every node to its rest place under `rotation`, at rest.
+void sim_reset(Sim* sim, const float rotation[9]);
+
+// Turns state and velocity by `turn` (row-major): the rotational part of a carry.
+void sim_turn(Sim* sim, const float turn[9]);
+
+// Positions in head space under `rotation`: [strand][node]. With `project`, lengths are put back to
+// rest from root to tip (links between two skinned nodes are left as they are).
+void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* positions);
+
+// World-axes positions relative to the head, as simulated: [strand][node]; for measurements.
+void sim_state(const Sim* sim, Vec3* positions, Vec3* previous);
+
+// Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position then
+// previous position; padding lanes left out. `hash_state` is an XXH64_state_t*.
+void sim_hash(const Sim* sim, void* hash_state);
