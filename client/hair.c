@@ -1,0 +1,66 @@
+#include "client/hair.h"
+
+#include "client/program.h"
+
+#include <string.h>
+
+bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault)
+{
+    memset(hair, 0, sizeof *hair);
+    hair->style = style;
+    if (!ribbons_build(&hair->ribbons, style, fault) ||
+        !upload_create(&hair->guides, gl, style, fault) ||
+        !update_create(&hair->update, gl, style, &hair->ribbons, fault) ||
+        !body_build(&hair->body, gl, style, &hair->ribbons, fault)) {
+        hair_free(hair, gl);
+        return false;
+    }
+    gl->GenVertexArrays(1, &hair->vao);
+    gl->BindVertexArray(hair->vao);
+    gl->GenBuffers(1, &hair->indices);
+    gl->BindBuffer(GL_ELEMENT_ARRAY_BUFFER, hair->indices);
+    gl->BufferData(GL_ELEMENT_ARRAY_BUFFER,
+                   (GLsizeiptr)((size_t)hair->ribbons.index_count * sizeof(uint32_t)),
+                   hair->ribbons.indices, GL_STATIC_DRAW);
+    gl->BindVertexArray(0);
+    return true;
+}
+
+void hair_free(Hair* hair, const Gl* gl)
+{
+    ribbons_free(&hair->ribbons);
+    upload_free(&hair->guides, gl);
+    update_free(&hair->update, gl);
+    body_free(&hair->body, gl);
+    gl->DeleteVertexArrays(1, &hair->vao);
+    gl->DeleteBuffers(1, &hair->indices);
+    memset(hair, 0, sizeof *hair);
+}
+
+void hair_samplers(const Gl* gl, GLuint program)
+{
+    program_sampler(gl, program, "drawn_positions", UNIT_POSITIONS);
+    program_sampler(gl, program, "drawn_normals", UNIT_NORMALS);
+    program_sampler(gl, program, "drawn_tangents", UNIT_TANGENTS);
+    program_sampler(gl, program, "table_offsets", UNIT_OFFSETS);
+    program_sampler(gl, program, "fibre_ranks", UNIT_FIBRES);
+}
+
+int hair_draw(const Hair* hair, const Gl* gl, GLuint fibres)
+{
+    if (hair->ribbons.index_count == 0) return 0;
+    const GLuint textures[UNIT_FREE] = {
+        hair->update.targets[UPDATE_POSITIONS], hair->update.targets[UPDATE_NORMALS],
+        hair->update.targets[UPDATE_TANGENTS], hair->update.tables[TABLE_OFFSETS], fibres};
+    for (GLenum unit = 0; unit < UNIT_FREE; ++unit) {
+        gl->ActiveTexture(GL_TEXTURE0 + unit);
+        gl->BindTexture(unit == UNIT_FIBRES ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D, textures[unit]);
+    }
+    gl->ActiveTexture(GL_TEXTURE0);
+    gl->Enable(GL_PRIMITIVE_RESTART);
+    gl->PrimitiveRestartIndex(RIBBONS_RESTART);
+    gl->BindVertexArray(hair->vao);
+    gl->DrawElements(GL_TRIANGLE_STRIP, hair->ribbons.index_count, GL_UNSIGNED_INT, NULL);
+    gl->Disable(GL_PRIMITIVE_RESTART);
+    return 1;
+}

@@ -1,0 +1,26 @@
+// One style on the GPU: everything that is drawn of a head, and how to draw its ribbons.
+#pragma once
+
+#include "client/body.h"
+#include "client/update.h"
+
+typedef struct Hair {
+    const Hairstyle* style; // not owned
+    Ribbons ribbons;
+    GuideTextures guides;
+    Update update;
+    Body body;
+    GLuint vao, indices;
+} Hair;
+
+bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault);
+void hair_free(Hair* hair, const Gl* gl);
+
+// Texture units that ribbon.glsl and fibres.glsl read.
+enum { UNIT_POSITIONS, UNIT_NORMALS, UNIT_TANGENTS, UNIT_OFFSETS, UNIT_FIBRES, UNIT_FREE };
+
+// Points a program's ribbon samplers at those units; once after building it.
+void hair_samplers(const Gl* gl, GLuint program);
+// Binds the style's tables and draws all ribbons with the program in use. Returns the draw calls:
+// 1, or 0 where there is nothing to draw.
+int hair_draw(const Hair* hair, const Gl* gl, GLuint fibres);

@@ -1,0 +1,359 @@
+#include "client/options.h"
+
+#include <argp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    KEY_URL = 256,
+    KEY_LOG,
+    KEY_EMBEDDED,
+    KEY_STYLE,
+    KEY_HEAD,
+    KEY_UNIT,
+    KEY_MOTION,
+    KEY_SLOT,
+    KEY_BACKEND,
+    KEY_SIZE,
+    KEY_MSAA,
+    KEY_TARGET,
+    KEY_DISTANCE,
+    KEY_YAW,
+    KEY_PITCH,
+    KEY_FOV,
+    KEY_LIGHT,
+    KEY_BACKGROUND,
+    KEY_TRANSPARENCY,
+    KEY_VIEW,
+    KEY_TICK,
+    KEY_TICKS,
+    KEY_EPOCH,
+    KEY_FRAMES,
+    KEY_TIMEOUT,
+    KEY_OUT,
+    KEY_STATS,
+    KEY_VERBOSE
+};
+
+static const struct argp_option arguments[] = {
+    {0, 0, 0, 0, "Where the hair comes from (default: the bus)", 1},
+    {"url", KEY_URL, "URL", 0, "LCM bus; default $LCM_DEFAULT_URL or udpm://239.255.76.67:7667", 0},
+    {"log", KEY_LOG, "FILE", 0, "a recorded log, played frame by frame without a network", 0},
+    {"embedded", KEY_EMBEDDED, 0, 0, "a daemon inside this process, one tick a frame", 0},
+    {"style", KEY_STYLE, "NAME|FILE", 0, "embedded: long, bob, a .json or .tfx files (repeat)", 0},
+    {"head", KEY_HEAD, "FILE.obj", 0, "embedded: the head of a .tfx groom", 0},
+    {"unit", KEY_UNIT, "M", 0, "embedded: metres per unit of the groom's files", 0},
+    {"motion", KEY_MOTION, "NAME", 0, "embedded: none, nod, shake, run, turn, teleport", 0},
+    {"slot", KEY_SLOT, "N", 0, "which character (default 0)", 0},
+    {0, 0, 0, 0, "The picture", 2},
+    {"backend", KEY_BACKEND, "NAME", 0, "auto (default), egl, osmesa or null", 0},
+    {"size", KEY_SIZE, "WxH", 0, "pixels (default 1024x768)", 0},
+    {"msaa", KEY_MSAA, "N", 0, "samples a pixel: 1, 2 or 4 (default)", 0},
+    {"target", KEY_TARGET, "X,Y,Z", 0,
+     "what the camera orbits, head space m (default: head centre)", 0},
+    {"distance", KEY_DISTANCE, "M", 0, "from the target (default: all of the hair is seen)", 0},
+    {"yaw", KEY_YAW, "DEG", 0, "0 sees the face, 90 stands on +X (default 30)", 0},
+    {"pitch", KEY_PITCH, "DEG", 0, "positive looks down (default 5)", 0},
+    {"fov", KEY_FOV, "DEG", 0, "vertical (default 45)", 0},
+    {"light", KEY_LIGHT, "YAW,PITCH", 0, "where the key light stands (default 40,45)", 0},
+    {"background", KEY_BACKGROUND, "RRGGBB", 0, "one sRGB colour instead of the grey backdrop", 0},
+    {"transparency", KEY_TRANSPARENCY, "NAME", 0,
+     "test, or hash (default at 2 or more samples): hash-dithered coverage", 0},
+    {"view", KEY_VIEW, "NAME", 0, "shaded (default) or coverage: hair as linear grey", 0},
+    {0, 0, 0, 0, "Which ticks", 3},
+    {"tick", KEY_TICK, "N", 0, "draw exactly tick N (log, embedded)", 0},
+    {"ticks", KEY_TICKS, "A:B[:STEP]", 0,
+     "draw ticks A to B, both included, or every STEP-th of them (log, embedded)", 0},
+    {"epoch", KEY_EPOCH, "E", 0, "of a log that holds several", 0},
+    {"frames", KEY_FRAMES, "N", 0, "end after N pictures", 0},
+    {"timeout", KEY_TIMEOUT, "S", 0, "bus: fail if nothing new comes for S seconds", 0},
+    {0, 0, 0, 0, "What comes out", 4},
+    {"out", KEY_OUT, "FILE.png|DIR|FILE.mp4", 0,
+     "the last picture, every picture as DIR/00000.png ..., or a film (needs ffmpeg)", 0},
+    {"stats", KEY_STATS, "FILE.json", 0,
+     "counters and pass times at the end; - for standard output", 0},
+    {"quiet", 'q', 0, 0, "errors only", 0},
+    {"verbose", KEY_VERBOSE, 0, 0, "at the end, pictures and hair pixels", 0},
+    {0}};
+
+static const char text[] =
+    "Draws hair that a hair-server streams (or that a log holds), headless, on EGL or OSMesa.\v"
+    "Examples:\n"
+    "  hair-client --out hair.png --frames 60          the 60th picture from the bus\n"
+    "  hair-client --slot 3 --yaw 180 --out frames/    character 3 from behind, every tick\n"
+    "  hair-client --log run.lcmlog --tick 120 --out t120.png\n"
+    "  hair-client --log run.lcmlog --ticks 0:179 --out run.mp4\n"
+    "  hair-client --embedded --style bob --motion shake --frames 60 --out bob.png\n"
+    "Any start order: a client waits for its daemon, and finds it again after a restart.\n"
+    "Exit status: 0 done, 1 failed, 2 wrong arguments.";
+
+static double number(struct argp_state* state, const char* name, const char* value, double low,
+                     double high)
+{
+    char* end;
+    double n = strtod(value, &end);
+    if (end == value || *end != '\0' || !(n >= low && n <= high))
+        argp_error(state, "--%s %s: want a number from %g to %g", name, value, low, high);
+    return n;
+}
+
+static int64_t integer(struct argp_state* state, const char* name, const char* value, int64_t low,
+                       int64_t high)
+{
+    char* end;
+    long long n = strtoll(value, &end, 10);
+    if (end == value || *end != '\0' || n < low || n > high)
+        argp_error(state, "--%s %s: want a whole number from %lld to %lld", name, value,
+                   (long long)low, (long long)high);
+    return n;
+}
+
+// The whole numbers between `separator`s; how many, or 0 where `value` is anything else or more
+// than `most` of them. Not sscanf: what it makes of a number that does not fit is undefined.
+static int integers(int64_t* numbers, int most, const char* value, char separator)
+{
+    for (int n = 0; n < most; ++n) {
+        char* end;
+        numbers[n] = strtoll(value, &end, 10); // out of range: the largest or least
+        if (end == value) return 0;
+        if (*end == '\0') return n + 1;
+        if (*end != separator) return 0;
+        value = end + 1;
+    }
+    return 0;
+}
+
+static void parse_size(struct argp_state* state, const char* value, ShadeOptions* shade)
+{
+    int64_t size[2] = {0, 0};
+    if (integers(size, 2, value, 'x') != 2 || size[0] < 16 || size[1] < 16 || size[0] > 8192 ||
+        size[1] > 8192)
+        argp_error(state, "--size %s: want WIDTHxHEIGHT, 16 to 8192 each, like 1024x768", value);
+    shade->width = (int)size[0];
+    shade->height = (int)size[1];
+}
+
+static float linear(unsigned code)
+{
+    float c = (float)code / 255.0f;
+    return c <= 0.04045f ? c / 12.92f : powf((c + 0.055f) / 1.055f, 2.4f);
+}
+
+static void parse_background(struct argp_state* state, const char* value, ShadeOptions* shade)
+{
+    unsigned r = 0, g = 0, b = 0;
+    if (value[0] == '#') ++value;
+    if (strlen(value) != 6 || sscanf(value, "%2x%2x%2x", &r, &g, &b) != 3)
+        argp_error(state, "--background %s: want six hex digits RRGGBB, like 898989", value);
+    shade->has_background = true;
+    shade->background = vec3(linear(r), linear(g), linear(b));
+}
+
+static void parse_target(struct argp_state* state, const char* value, CameraOptions* camera)
+{
+    char after;
+    Vec3* t = &camera->target;
+    if (sscanf(value, "%f,%f,%f%c", &t->x, &t->y, &t->z, &after) != 3 || !vec3_finite(*t))
+        argp_error(state, "--target %s: want X,Y,Z in metres, like 0,0.2,0", value);
+    camera->has_target = true;
+}
+
+static void parse_ticks(struct argp_state* state, const char* value, Options* options)
+{
+    int64_t ticks[3] = {0, 0, 1}; // first, last, step
+    if (integers(ticks, 3, value, ':') < 2 || ticks[0] < 0 || ticks[1] < ticks[0] ||
+        ticks[1] > INT32_MAX || ticks[2] < 1 || ticks[2] > INT32_MAX)
+        argp_error(state,
+                   "--ticks %s: want A:B or A:B:STEP with 0 <= A <= B, like 0:179 or 0:179:2",
+                   value);
+    options->first_tick = (int32_t)ticks[0];
+    options->last_tick = (int32_t)ticks[1];
+    options->tick_step = (int32_t)ticks[2];
+    options->has_ticks = true;
+}
+
+// Index of `value` in `names` (ended by NULL), or a usage error that lists them.
+static int choice(struct argp_state* state, const char* name, const char* value,
+                  const char* const* names)
+{
+    char list[128] = "";
+    for (int i = 0; names[i] != NULL; ++i) {
+        if (strcmp(names[i], value) == 0) return i;
+        size_t used = strlen(list);
+        snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", names[i]);
+    }
+    argp_error(state, "--%s %s: choose from %s", name, value, list);
+    return 0;
+}
+
+static error_t parse_source(int key, char* value, struct argp_state* state, Options* options)
+{
+    switch (key) {
+    case KEY_URL:
+        options->url = value;
+        break;
+    case KEY_LOG:
+        options->log = value;
+        break;
+    case KEY_EMBEDDED:
+        options->embedded = true;
+        break;
+    case KEY_STYLE:
+        if (options->style_count == OPTIONS_MAX_STYLES)
+            argp_error(state, "--style: at most %d", OPTIONS_MAX_STYLES);
+        options->styles[options->style_count++] = value;
+        break;
+    case KEY_HEAD:
+        options->head = value;
+        break;
+    case KEY_UNIT:
+        options->unit_m = number(state, "unit", value, 1e-6, 1e3);
+        break;
+    case KEY_MOTION:
+        options->motion = value;
+        break;
+    case KEY_SLOT:
+        options->slot = (int)integer(state, "slot", value, 0, 1023);
+        break;
+    case KEY_EPOCH:
+        options->epoch = integer(state, "epoch", value, 1, INT64_MAX);
+        break;
+    case KEY_TIMEOUT:
+        options->timeout_s = number(state, "timeout", value, 0, 1e6);
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+static error_t parse_picture(int key, char* value, struct argp_state* state, Options* options)
+{
+    static const char* const backends[] = {"auto", "egl", "osmesa", "null", NULL};
+    static const char* const transparencies[] = {"test", "hash", NULL};
+    static const char* const views[] = {"shaded", "coverage", NULL};
+    ShadeOptions* shade = &options->shade;
+    CameraOptions* camera = &options->camera;
+    char after;
+    switch (key) {
+    case KEY_BACKEND:
+        options->backend = backends[choice(state, "backend", value, backends)];
+        break;
+    case KEY_SIZE:
+        parse_size(state, value, shade);
+        break;
+    case KEY_MSAA:
+        shade->samples = (int)integer(state, "msaa", value, 1, 4);
+        if (shade->samples == 3) argp_error(state, "--msaa 3: choose 1, 2 or 4");
+        break;
+    case KEY_TARGET:
+        parse_target(state, value, camera);
+        break;
+    case KEY_DISTANCE:
+        camera->distance_m = (float)number(state, "distance", value, 0.05, 1000);
+        camera->has_distance = true;
+        break;
+    case KEY_YAW:
+        camera->yaw_deg = (float)number(state, "yaw", value, -3600, 3600);
+        break;
+    case KEY_PITCH:
+        camera->pitch_deg = (float)number(state, "pitch", value, -90, 90);
+        break;
+    case KEY_FOV:
+        camera->fov_deg = (float)number(state, "fov", value, 1, 150);
+        break;
+    case KEY_LIGHT:
+        if (sscanf(value, "%f,%f%c", &shade->light_yaw_deg, &shade->light_pitch_deg, &after) != 2 ||
+            !isfinite(shade->light_yaw_deg) || !(fabsf(shade->light_pitch_deg) <= 90.0f))
+            argp_error(state, "--light %s: want YAW,PITCH in degrees, like 40,45", value);
+        break;
+    case KEY_BACKGROUND:
+        parse_background(state, value, shade);
+        break;
+    case KEY_TRANSPARENCY:
+        shade->transparency = choice(state, "transparency", value, transparencies)
+                                  ? TRANSPARENCY_HASH
+                                  : TRANSPARENCY_TEST;
+        break;
+    case KEY_VIEW:
+        shade->view = choice(state, "view", value, views) ? VIEW_COVERAGE : VIEW_SHADED;
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+static void check(struct argp_state* state, const Options* options)
+{
+    if ((options->log != NULL) + options->embedded + (options->url != NULL) > 1)
+        argp_error(state, "choose one of --url, --log and --embedded");
+    bool daemon_options =
+        options->style_count > 0 || options->head || options->motion || options->unit_m > 0;
+    if (daemon_options && !options->embedded)
+        argp_error(state, "--style, --head, --unit and --motion go with --embedded; on the bus the "
+                          "hair-server has them");
+    if (options->has_ticks && options->log == NULL && !options->embedded)
+        argp_error(state,
+                   "--tick and --ticks go with --log or --embedded; the bus shows what comes");
+    if (options->timeout_s > 0 && (options->log != NULL || options->embedded))
+        argp_error(state, "--timeout goes with the bus; a log and --embedded never wait");
+    if (options->motion != NULL && strcmp(options->motion, "bus") == 0)
+        argp_error(state, "--motion bus: --embedded hears no bus; choose another motion");
+    if (options->epoch != 0 && options->log == NULL) argp_error(state, "--epoch goes with --log");
+    if (options->shade.transparency == TRANSPARENCY_HASH && options->shade.samples < 2)
+        argp_error(state, "--transparency hash needs --msaa 2 or 4");
+}
+
+static error_t parse(int key, char* value, struct argp_state* state)
+{
+    Options* options = state->input;
+    if (parse_source(key, value, state, options) == 0) return 0;
+    if (parse_picture(key, value, state, options) == 0) return 0;
+    switch (key) {
+    case KEY_TICK:
+        options->first_tick = options->last_tick =
+            (int32_t)integer(state, "tick", value, 0, INT32_MAX);
+        options->has_ticks = true;
+        break;
+    case KEY_TICKS:
+        parse_ticks(state, value, options);
+        break;
+    case KEY_FRAMES:
+        options->frames = integer(state, "frames", value, 1, INT64_MAX);
+        break;
+    case KEY_OUT:
+        options->out = value;
+        break;
+    case KEY_STATS:
+        options->stats = value;
+        break;
+    case 'q':
+        options->quiet = true;
+        break;
+    case KEY_VERBOSE:
+        options->verbose = true;
+        break;
+    case ARGP_KEY_ARG:
+        argp_error(state, "unexpected argument '%s'", value);
+        break;
+    case ARGP_KEY_END:
+        check(state, options);
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+Options options_parse(int argc, char** argv)
+{
+    Options options = {
+        .backend = "auto", .shade = shade_default(), .camera = camera_default(), .tick_step = 1};
+    argp_program_version = "hair-client " STRANDCAST_VERSION;
+    argp_err_exit_status = 2;
+    static const struct argp argp = {arguments, parse, NULL, text, NULL, NULL, NULL};
+    argp_parse(&argp, argc, argv, 0, NULL, &options);
+    return options;
+}

@@ -1,0 +1,212 @@
+#include "client/shade.h"
+
+#include "client/program.h"
+
+#include <stdio.h>
+#include <string.h>
+
+// How fast hair dims light: e-fold in 11 mm. Chosen by eye: less looks like glass, more hides the
+// locks.
+#define EXTINCTION_PER_M 90.0f
+
+ShadeOptions shade_default(void)
+{
+    return (ShadeOptions){.width = 1024,
+                          .height = 768,
+                          .samples = 4,
+                          .light_yaw_deg = 40.0f,
+                          .light_pitch_deg = 45.0f};
+}
+
+static bool complete(const Gl* gl, const char* what, Fault* fault)
+{
+    if (gl->CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return true;
+    return fault_set(fault, "the driver refuses the %s framebuffer", what);
+}
+
+static bool create_multisampled(Shade* shade, const Gl* gl, Fault* fault)
+{
+    int width = shade->options.width, height = shade->options.height;
+    gl->GenFramebuffers(1, &shade->multisampled);
+    gl->BindFramebuffer(GL_FRAMEBUFFER, shade->multisampled);
+    gl->GenRenderbuffers(1, &shade->colour);
+    gl->BindRenderbuffer(GL_RENDERBUFFER, shade->colour);
+    int samples = shade->samples > 1 ? shade->samples : 0;
+    gl->RenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_RGBA16F, width, height);
+    gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER,
+                                shade->colour);
+    gl->GenRenderbuffers(1, &shade->depth);
+    gl->BindRenderbuffer(GL_RENDERBUFFER, shade->depth);
+    gl->RenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_DEPTH_COMPONENT32F, width,
+                                       height);
+    gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, shade->depth);
+    if (!complete(gl, "multisampled", fault)) return false;
+    // A driver may give more than was asked (llvmpipe has 1 or 4); the sample mask must know.
+    GLint given = 0;
+    gl->GetIntegerv(GL_SAMPLES, &given);
+    if (shade->samples > 1 && given > 1) shade->samples = given;
+    return true;
+}
+
+// One sample a pixel, of the picture's size.
+static bool create_target(const Shade* shade, const Gl* gl, GLint format, GLuint* framebuffer,
+                          GLuint* texture, Fault* fault)
+{
+    gl->GenFramebuffers(1, framebuffer);
+    gl->BindFramebuffer(GL_FRAMEBUFFER, *framebuffer);
+    gl->GenTextures(1, texture);
+    gl->BindTexture(GL_TEXTURE_2D, *texture);
+    gl->TexImage2D(GL_TEXTURE_2D, 0, format, shade->options.width, shade->options.height, 0,
+                   GL_RGBA, format == GL_RGBA8 ? GL_UNSIGNED_BYTE : GL_FLOAT, NULL);
+    gl->TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    gl->TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    gl->FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, *texture, 0);
+    return complete(gl, "output", fault);
+}
+
+static bool build_programs(Shade* shade, const Gl* gl, Fault* fault)
+{
+    bool hash = shade->options.transparency == TRANSPARENCY_HASH ||
+                (shade->options.transparency == TRANSPARENCY_AUTO && shade->samples > 1);
+    char defines[96];
+    snprintf(defines, sizeof defines, "#define TRANSPARENCY_HASH %d\n#define SAMPLES %d\n",
+             hash && shade->samples > 1, shade->samples);
+    shade->hair_program = program_build(gl, "hair.vert", "hair.frag", defines, fault);
+    if (shade->hair_program == 0) return false;
+    hair_samplers(gl, shade->hair_program);
+    light_samplers(gl, shade->hair_program);
+    shade->body_program = program_build(gl, "body.vert", "body.frag", NULL, fault);
+    if (shade->body_program == 0) return false;
+    shadow_samplers(gl, shade->body_program);
+    shade->background_program =
+        program_build(gl, "fullscreen.vert", "background.frag", NULL, fault);
+    if (shade->background_program == 0) return false;
+    shade->resolve_program = program_build(gl, "fullscreen.vert", "resolve.frag", NULL, fault);
+    if (shade->resolve_program == 0) return false;
+    program_sampler(gl, shade->resolve_program, "radiance", 0);
+    return true;
+}
+
+static void place_lights(Shade* shade)
+{
+    float yaw = shade->options.light_yaw_deg, pitch = shade->options.light_pitch_deg;
+    shade->lights.key = camera_direction(yaw, pitch);
+    shade->lights.fill = camera_direction(yaw - 100.0f, 10.0f);
+    shade->lights.rim = camera_direction(yaw + 120.0f, 35.0f);
+    shade->lights.extinction_per_m = EXTINCTION_PER_M;
+}
+
+bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault* fault)
+{
+    memset(shade, 0, sizeof *shade);
+    shade->options = *options;
+    int limit = gl->sample_mask ? gl->max_samples : 1;
+    shade->samples = options->samples < limit ? options->samples : limit;
+    place_lights(shade);
+    gl->GenVertexArrays(1, &shade->vao);
+    if (create_multisampled(shade, gl, fault) && build_programs(shade, gl, fault) &&
+        create_target(shade, gl, GL_RGBA16F, &shade->resolved, &shade->resolved_texture, fault) &&
+        create_target(shade, gl, GL_RGBA8, &shade->output, &shade->output_texture, fault))
+        return true;
+    shade_free(shade, gl);
+    return false;
+}
+
+void shade_free(Shade* shade, const Gl* gl)
+{
+    gl->DeleteProgram(shade->hair_program);
+    gl->DeleteProgram(shade->body_program);
+    gl->DeleteProgram(shade->background_program);
+    gl->DeleteProgram(shade->resolve_program);
+    gl->DeleteFramebuffers(1, &shade->multisampled);
+    gl->DeleteFramebuffers(1, &shade->resolved);
+    gl->DeleteFramebuffers(1, &shade->output);
+    gl->DeleteRenderbuffers(1, &shade->colour);
+    gl->DeleteRenderbuffers(1, &shade->depth);
+    gl->DeleteTextures(1, &shade->resolved_texture);
+    gl->DeleteTextures(1, &shade->output_texture);
+    gl->DeleteVertexArrays(1, &shade->vao);
+    memset(shade, 0, sizeof *shade);
+}
+
+static void draw_background(const Shade* shade, const Gl* gl)
+{
+    Vec3 low = {0.055f, 0.06f, 0.07f}, high = {0.30f, 0.31f, 0.33f};
+    if (shade->options.has_background) low = high = shade->options.background;
+    gl->UseProgram(shade->background_program);
+    program_uniform3(gl, shade->background_program, "background_low", low);
+    program_uniform3(gl, shade->background_program, "background_high", high);
+    gl->Uniform1i(program_uniform(gl, shade->background_program, "coverage_only"),
+                  shade->options.view == VIEW_COVERAGE);
+    gl->Disable(GL_DEPTH_TEST);
+    gl->BindVertexArray(shade->vao);
+    gl->DrawArrays(GL_TRIANGLES, 0, 3);
+    gl->Enable(GL_DEPTH_TEST);
+}
+
+// What hair.frag and body.frag share.
+static void use_program(const Shade* shade, const Gl* gl, GLuint program, const Shadow* shadow,
+                        const Hair* hair, const Frame* frame)
+{
+    const Camera* camera = &frame->camera;
+    const HairMaterial* material = &hair->style->material;
+    Mat4 view_projection = matrix_mul(&camera->projection, &camera->view);
+    gl->UseProgram(program);
+    gl->UniformMatrix4fv(program_uniform(gl, program, "view_projection"), 1, GL_FALSE,
+                         &view_projection.m[0][0]);
+    gl->UniformMatrix3fv(program_uniform(gl, program, "head_rotation"), 1, GL_TRUE,
+                         frame->rotation);
+    program_uniform3(gl, program, "eye", camera->eye);
+    lights_bind(&shade->lights, gl, program);
+    program_uniform3(gl, program, "root_colour", material->root_colour);
+    gl->Uniform1f(program_uniform(gl, program, "pixel_angle"),
+                  2.0f / camera->projection.m[1][1] / (float)shade->options.height);
+    gl->Uniform1i(program_uniform(gl, program, "coverage_only"),
+                  shade->options.view == VIEW_COVERAGE);
+    shadow_bind(shadow, gl, program);
+}
+
+static void resolve(const Shade* shade, const Gl* gl)
+{
+    int width = shade->options.width, height = shade->options.height;
+    gl->BindFramebuffer(GL_READ_FRAMEBUFFER, shade->multisampled);
+    gl->BindFramebuffer(GL_DRAW_FRAMEBUFFER, shade->resolved);
+    gl->BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    gl->BindFramebuffer(GL_FRAMEBUFFER, shade->output);
+    gl->Disable(GL_DEPTH_TEST);
+    gl->UseProgram(shade->resolve_program);
+    gl->Uniform1i(program_uniform(gl, shade->resolve_program, "coverage_only"),
+                  shade->options.view == VIEW_COVERAGE);
+    gl->ActiveTexture(GL_TEXTURE0);
+    gl->BindTexture(GL_TEXTURE_2D, shade->resolved_texture);
+    gl->BindVertexArray(shade->vao);
+    gl->DrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* shadow,
+              const Light* light, const Frame* frame)
+{
+    gl->BindFramebuffer(GL_FRAMEBUFFER, shade->multisampled);
+    gl->Viewport(0, 0, shade->options.width, shade->options.height);
+    if (shade->samples > 1) gl->Enable(GL_MULTISAMPLE);
+    gl->DepthMask(GL_TRUE);
+    gl->ClearDepth(1.0);
+    gl->Clear(GL_DEPTH_BUFFER_BIT);
+    draw_background(shade, gl);
+    use_program(shade, gl, shade->body_program, shadow, hair, frame);
+    int calls = body_draw(&hair->body, gl);
+    use_program(shade, gl, shade->hair_program, shadow, hair, frame);
+    light_show(light, gl);
+    calls += hair_draw(hair, gl, shadow->fibres);
+    resolve(shade, gl);
+    return calls + 2; // and background and resolve
+}
+
+void shade_read(const Shade* shade, const Gl* gl, Image* image)
+{
+    gl->BindFramebuffer(GL_FRAMEBUFFER, shade->output);
+    gl->ReadBuffer(GL_COLOR_ATTACHMENT0);
+    gl->PixelStorei(GL_PACK_ALIGNMENT, 1);
+    gl->ReadPixels(0, 0, image->width, image->height, GL_RGBA, GL_UNSIGNED_BYTE, image->rgba);
+    image_flip(image);
+}

@@ -1,0 +1,30 @@
+// Light pass: radiance of every ribbon point towards the eye (client/light.h says why points).
+#include "lights.glsl"
+#include "kajiya.glsl"
+#include "transmittance.glsl"
+uniform sampler2D drawn_positions, drawn_normals, drawn_tangents;
+uniform mat3 head_rotation;
+uniform vec3 eye; // relative to the head's position, world axes
+uniform vec3 root_colour, tip_colour;
+
+layout(location = 0) out vec4 out_body;  // scales with the hair's own tone
+layout(location = 1) out vec4 out_shine; // first highlight
+
+void main()
+{
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec3 position = head_rotation * texelFetch(drawn_positions, at, 0).xyz;
+    vec3 normal = head_rotation * texelFetch(drawn_normals, at, 0).xyz;
+    vec4 tangent = texelFetch(drawn_tangents, at, 0);
+    float along = tangent.w;
+    vec3 view = normalize(eye - position);
+    Strand strand = Strand(normalize(head_rotation * tangent.xyz), normalize(normal),
+                           mix(root_colour, tip_colour, along));
+    Lobes sum = scaled(kajiya_shade(strand, key_direction, view), KEY * hair_lit(position));
+    // Deeper hair sees less of what casts no shadow here.
+    float open = 0.35 + 0.65 * smoothstep(0.0, 0.6, along);
+    sum = added(sum, scaled(kajiya_shade(strand, fill_direction, view), FILL * open));
+    sum = added(sum, scaled(kajiya_shade(strand, rim_direction, view), RIM * open));
+    out_body = vec4(sum.body + SKY * open * (0.6 + 0.4 * normal.y) * strand.colour, 1.0);
+    out_shine = vec4(sum.shine, 1.0);
+}

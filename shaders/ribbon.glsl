@@ -1,0 +1,50 @@
+// A vertex of a ribbon: one edge of one point, widened across what looks at it.
+uniform sampler2D drawn_positions; // head space m; half width
+uniform sampler2D drawn_normals;   // head space; random
+uniform sampler2D drawn_tangents;  // head space; along
+uniform sampler2D table_offsets;   // w: fill
+uniform mat3 head_rotation;
+
+struct Ribbon {
+    vec3 position; // world axes, relative to the head's position
+    vec3 tangent;
+    ivec2 texel;
+    float along, random, fill;
+    float across; // metres from the centre line, before any widening
+};
+
+// `eye` is where the viewer stands (eye.w = 1) or the direction it looks from (eye.w = 0).
+// A ribbon is never thinner than `pixel` per metre of distance; its fill then falls instead.
+Ribbon ribbon_vertex(int vertex, vec4 eye, float pixel)
+{
+    int i = vertex >> 1;
+    int width = textureSize(drawn_positions, 0).x;
+    ivec2 at = ivec2(i % width, i / width);
+    vec4 p = texelFetch(drawn_positions, at, 0);
+    vec4 n = texelFetch(drawn_normals, at, 0);
+    vec4 t = texelFetch(drawn_tangents, at, 0);
+    Ribbon r;
+    r.position = head_rotation * p.xyz;
+    r.tangent = head_rotation * t.xyz;
+    r.texel = at;
+    r.along = t.w;
+    r.random = n.w;
+    float edge = float(vertex & 1) * 2.0 - 1.0;
+    r.across = edge * p.w;
+    vec3 towards = eye.xyz - eye.w * r.position;
+    float least = 0.5 * pixel * (eye.w > 0.0 ? length(towards) : 1.0);
+    float half_width = max(p.w, least);
+    r.fill = texelFetch(table_offsets, at, 0).w * p.w / half_width;
+    vec3 side = cross(r.tangent, towards);
+    float length2 = dot(side, side);
+    r.position += side * (length2 > 1e-20 ? inversesqrt(length2) : 0.0) * edge * half_width;
+    return r;
+}
+
+// Which part of the fibre pattern a ribbon shows; x across, y along, z layer. The texture holds 16
+// strands side by side; one every 0.8 mm is what a picture of a whole head can resolve.
+vec3 fibre_place(float across_m, float along, float random)
+{
+    float across = across_m / (16.0 * 0.0008) + fract(random * 61.0);
+    return vec3(across, along * 0.5 + fract(random * 17.0), floor(random * 3.999));
+}
