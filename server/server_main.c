@@ -16,8 +16,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#define EXIT_USAGE 2
-#define SLICES     4 // guides go out in so many portions a tick: a burst overruns socket buffers
+#define EXIT_USAGE   2
+#define SLOW_SHARE   0.1 // of a second's ticks dropped
+#define SLOW_SECONDS 3
+#define SLICES       4 // guides go out in so many portions a tick: a burst overruns socket buffers
 
 const char* argp_program_version = "hair-server (strandcast) " STRANDCAST_VERSION;
 
@@ -329,8 +331,10 @@ typedef struct Server {
     Daemon* daemon;
     Link* link;
     LogWriter* log;
-    bool failed;       // a fault was said
-    bool has_progress; // a line without its end stands on the terminal
+    bool failed;            // a fault was said
+    bool has_progress;      // a line without its end stands on the terminal
+    int64_t dropped_before; // a second ago
+    int slow_seconds;       // in a row
     bool told_slow;
     int64_t send_failures;
 } Server;
@@ -477,20 +481,22 @@ static void run_fast(Server* server)
     }
 }
 
-// Once: a hiccup drops a few ticks, a machine that is too slow goes on and on.
-static void tell_slow(Server* server, double elapsed_s)
+// Called each second; said once. A hiccup drops the ticks of a second or two, a machine that is too
+// slow goes on and on.
+static void tell_slow(Server* server)
 {
     int64_t dropped = daemon_status(server->daemon).overruns;
-    double due = elapsed_s * daemon_rate_hz(server->daemon);
-    if (server->told_slow || server->options->quiet || elapsed_s < 2.0 ||
-        (double)dropped < 0.1 * due)
-        return;
+    double share = (double)(dropped - server->dropped_before) / daemon_rate_hz(server->daemon);
+    server->dropped_before = dropped;
+    server->slow_seconds = share > SLOW_SHARE ? server->slow_seconds + 1 : 0;
+    if (server->told_slow || server->options->quiet || server->slow_seconds < SLOW_SECONDS) return;
     server->told_slow = true;
     char text[160];
     snprintf(text, sizeof text,
-             "too slow here: %" PRId64 " of %.0f ticks dropped so far; fewer "
-             "characters, substeps or Hz",
-             dropped, due);
+             "too slow here: %" PRId64
+             " ticks dropped so far, over %g %% in each of the last %d s; "
+             "fewer characters, substeps or Hz",
+             dropped, 100 * SLOW_SHARE, SLOW_SECONDS);
     say_notice(server, text);
 }
 
@@ -508,7 +514,7 @@ static int64_t drop_late_ticks(Server* server, int64_t tick_us, double* due_us)
 static void run_paced(Server* server)
 {
     double exact_us = 1e6 / daemon_rate_hz(server->daemon);
-    double start_us = (double)base_monotonic_us(), due_us = start_us, said_us = start_us;
+    double due_us = (double)base_monotonic_us(), said_us = due_us;
     for (int64_t done = 0; goes_on(server, done); ++done) {
         daemon_tick(server->daemon);
         if (done == 0 && server->log != NULL)
@@ -520,7 +526,7 @@ static void run_paced(Server* server)
         daemon_publish_background(server->daemon, (int64_t)exact_us);
         if (due_us - said_us >= 1e6) {
             say_progress(server);
-            tell_slow(server, (due_us - start_us) * 1e-6);
+            tell_slow(server);
             said_us = due_us;
         }
         due_us += exact_us;

@@ -274,6 +274,16 @@ static inline int process_lines(const char* text)
     return lines;
 }
 
+// Lines of standard error but for the server's "too slow here": whether it comes is the machine's
+// doing, not the program's.
+static inline int process_complaints(const Process* process)
+{
+    int slow = 0;
+    for (const char* at = process->text[1]; (at = strstr(at, "too slow here")) != NULL; ++at)
+        ++slow;
+    return process_lines(process->text[1]) - slow;
+}
+
 // The number after `label` on standard output.
 static inline int64_t process_number(const Process* process, const char* label)
 {

@@ -257,7 +257,7 @@ static void server_and_client_live_through_hostile_messages(void** state)
     assert_int_equal(stats_integer(root, "epoch"), epoch);
     json_decref(root);
     // One line a kind: four channels here, and damage of five kinds or a bad style part there.
-    if (process_lines(server.text[1]) != 4) process_fail(&server, "not one line a channel");
+    if (process_complaints(&server) != 4) process_fail(&server, "not one line a channel");
     if (process_lines(client.text[1]) > 6 || process_lines(client.text[1]) < 2)
         process_fail(&client, "not one line a kind");
     for (int kind = 1; kind <= FRAME_CRC; ++kind)

@@ -82,7 +82,7 @@ static void a_game_server_adds_moves_and_teleports_a_head_once(void** state)
     assert_true(path.least_m[1] < 1.90 && path.most_m[1] > 2.10);
     assert_true(path.least_m[1] > 1.75 && path.most_m[1] < 2.25);
     assert_true(path.longest_step_m < 0.05); // 0.008 as it swings: the jump is in no segment
-    if (process_lines(server.text[1]) != 0) process_fail(&server, "the server complained");
+    if (process_complaints(&server) != 0) process_fail(&server, "the server complained");
     bus_close(&bus);
 }
 
