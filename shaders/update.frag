@@ -72,9 +72,11 @@ void main()
         position += weights[j] * hermite(a, b, f);
         vec3 rest_a = texelFetch(rest_tangents, ivec2(k, row), 0).xyz;
         vec3 rest_b = texelFetch(rest_tangents, ivec2(k + 1, row), 0).xyz;
-        rest += weights[j] * mix(rest_a, rest_b, f);
+        // Not mix: a + (b - a) f blurs small sums.
+        float g = 1.0 - f;
+        rest += weights[j] * (rest_a * g + rest_b * f);
         // Roots are fixed to the head: what hangs on them must not turn with the first link.
-        now += weights[j] * mix(k == 0 ? rest_a : a.tangent, b.tangent, f);
+        now += weights[j] * ((k == 0 ? rest_a : a.tangent) * g + b.tangent * f);
     }
     bool turns = min(dot(now, now), dot(rest, rest)) > 1e-12;
     rest = turns ? normalize(rest) : vec3(0, -1, 0);
