@@ -148,14 +148,18 @@ static void strips_visit_every_point_once_and_break_between_ribbons(void** state
     hairstyle_destroy(style);
 }
 
+// Closer at the root, where hair bends round the skull.
 static void along_runs_from_root_to_tip(void** state)
 {
     (void)state;
     Hairstyle* style = drawing_style("long");
     Ribbons ribbons = must_build(style);
     int points = style->sets[0].points;
-    for (int k = 0; k < points; ++k)
-        assert_true(fabs((double)ribbons.tangents[k][3] - (double)k / (points - 1)) < 1e-6);
+    assert_true(ribbons.tangents[0][3] == 0.0f);
+    assert_true(ribbons.tangents[points - 1][3] == 1.0f);
+    for (int k = 2; k < points; ++k)
+        assert_true(ribbons.tangents[k][3] - ribbons.tangents[k - 1][3] >
+                    ribbons.tangents[k - 1][3] - ribbons.tangents[k - 2][3]);
     assert_true(ribbons.guides[0][3] == 0.0f);
     ribbons_free(&ribbons);
     hairstyle_destroy(style);
@@ -181,6 +185,43 @@ static void grown_wisps_rest_outside_the_mannequin(void** state)
                deepest * 1e3, highest_root * 1e3);
         assert_true(deepest > -0.0005);
         assert_true(highest_root < 0.001);
+        test_free(tangents);
+        ribbons_free(&ribbons);
+        hairstyle_destroy(style);
+    }
+}
+
+// Hair at a root, as half width times fill: the mean over roots on so much scalp.
+static double mean_fill(const Ribbons* ribbons, const Hairstyle* style, const Vec3* tangents,
+                        double least_scalp, double most_scalp)
+{
+    double sum = 0;
+    int roots = 0;
+    for (int i = 0; i < ribbons->point_count; ++i) {
+        DrawnPoint point = ribbons_point(ribbons, i);
+        if (point.height > 0.0f) continue;
+        Vec3 at =
+            vec3_from(drawn_position(&point, style->nodes, style->rest, tangents, tangents, NULL));
+        double scalp = (double)mannequin_scalp(at);
+        if (scalp < least_scalp || scalp > most_scalp) continue;
+        sum += (double)(ribbons->offsets[i][3] * ribbons->weights[i][3]);
+        ++roots;
+    }
+    assert_true(roots > 50);
+    return sum / roots;
+}
+
+static void hair_begins_thin_at_the_hairline(void** state)
+{
+    (void)state;
+    for (int s = 0; s < 2; ++s) {
+        Hairstyle* style = drawing_style(styles[s]);
+        Ribbons ribbons = must_build(style);
+        Vec3* tangents = rest_tangents(style);
+        double border = mean_fill(&ribbons, style, tangents, 0.0, 0.4);
+        double inside = mean_fill(&ribbons, style, tangents, 1.0, 1.0);
+        printf("%s: %.2f of the hair inside grows at the hairline\n", styles[s], border / inside);
+        assert_true(border < 0.35 * inside);
         test_free(tangents);
         ribbons_free(&ribbons);
         hairstyle_destroy(style);
@@ -355,6 +396,7 @@ int main(void)
         cmocka_unit_test(strips_visit_every_point_once_and_break_between_ribbons),
         cmocka_unit_test(along_runs_from_root_to_tip),
         cmocka_unit_test(grown_wisps_rest_outside_the_mannequin),
+        cmocka_unit_test(hair_begins_thin_at_the_hairline),
         cmocka_unit_test(sets_whose_strands_have_not_come_are_left_out),
         cmocka_unit_test(ribbons_of_long_stay_whole_and_rooted_in_motion),
         cmocka_unit_test(ribbons_of_bob_stay_whole_and_rooted_in_motion),
