@@ -140,6 +140,14 @@ static void grow_on(Vertex* vertex, const Grid* grid)
     vertex->root_tangent = vec3_normalise_or(tangent, vec3(0, -1, 0));
 }
 
+// Scalp of the mannequin, given how much hair grow_on found: whole well inside its hairline, and
+// over the border as ragged as the roots there, so that hair does not end on a drawn line.
+static float soften_border(const Vertex* vertex)
+{
+    float scalp = mannequin_scalp(vertex->position);
+    return scalp * fmaxf(scalp, fminf(2.0f * vertex->scalp, 1.0f));
+}
+
 // Whether grow_on has been there: what it leaves has length one.
 static bool is_grown(const Vertex* vertex)
 {
@@ -161,8 +169,7 @@ static void fill_vertices(Vertex* vertices, const HeadMesh* mesh, const Hairstyl
             v->albedo[2] = part->albedo.z;
             if (!part->is_skin || is_grown(v)) continue;
             grow_on(v, grid);
-            if (style->head_kind == HEAD_MANNEQUIN)
-                v->scalp = fmaxf(0.0f, 2.0f * mannequin_scalp(v->position) - 1.0f);
+            if (style->head_kind == HEAD_MANNEQUIN) v->scalp = soften_border(v);
         }
     }
 }
