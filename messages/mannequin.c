@@ -8,8 +8,8 @@
 // How the head is shaped. Primitives are joined root to tip of this file's table of contents,
 // mannequin_distance: skull, face, jaw, features, ears, bust. The right half is a mirror of the
 // left (x >= 0), which halves the work and cannot drift. Every number is in metres of head space;
-// the proportions are the classical thirds: hairline 0.290, brow 0.230, nose base 0.168, chin
-// 0.107.
+// the proportions are the classical thirds, the hairline a little low: hairline 0.285, brow 0.230,
+// nose base 0.168, chin 0.107.
 //
 // Sums of blobs make potatoes; what makes a face is where flesh is NOT: temples, eye sockets, under
 // the cheekbones, under the lower lip, under the jaw. Those are the cuts.
@@ -269,7 +269,7 @@ typedef struct HairlineKnot {
 } HairlineKnot;
 
 static const HairlineKnot HAIRLINE[] = {
-    {0.00f, 0.2900f}, {0.20f, 0.2895f}, {0.38f, 0.2790f}, {0.52f, 0.2560f}, {0.64f, 0.2300f},
+    {0.00f, 0.2850f}, {0.20f, 0.2845f}, {0.38f, 0.2750f}, {0.52f, 0.2560f}, {0.64f, 0.2300f},
     {0.76f, 0.2120f}, {0.86f, 0.2130f}, {1.02f, 0.2320f}, {1.18f, 0.2300f}, {1.34f, 0.1950f},
     {1.54f, 0.1560f}, {1.75f, 0.1420f}, {2.00f, 0.1400f},
 };

@@ -31,7 +31,7 @@ typedef struct Look {
 #define GUIDES          64
 #define NODES           8
 #define PARTING_PAIRS   5
-#define PARTING_GAP_M   0.0025f // half the bare line between the two rows
+#define PARTING_GAP_M   0.0015f // half the bare line between the two rows
 #define HAIRLINE_GUIDES 19
 #define HAIRLINE_SKIN   0.30f // mannequin_scalp at the outermost roots
 #define LOOP_POINTS     144
@@ -302,13 +302,14 @@ static Vec3 tangent(Vec3 v, Vec3 normal)
 }
 
 // The comb, along the skin: away from the parting, turning back towards its end so that the two
-// sides meet in a fan and not in a seam; back where there is a face below; down behind the crown.
+// sides meet in a fan and not in a seam (bit by bit: turned only at the end, a tuft stood up
+// there); back where there is a face below; down behind the crown.
 static Vec3 comb(const Plan* plan, Vec3 p, Vec3 normal)
 {
     float run = plan->parting_front.z - plan->parting_back.z;
     float u = (plan->parting_front.z - p.z) / run;
     u = u < 0.0f ? 0.0f : u > 1.0f ? 1.0f : u;
-    float back = plan->look->sweep * smooth((p.z + 0.03f) / 0.08f) + 1.6f * u * u * u;
+    float back = plan->look->sweep * smooth((p.z + 0.03f) / 0.08f) + (0.75f + 0.95f * u) * u;
     float down = smooth((0.315f - p.y) / 0.06f) * (1.0f - smooth(p.z / 0.05f));
     // Under the back of the skull "away" and "back" would point up and across along the skin.
     float level = 1.0f - 0.95f * down;
@@ -373,11 +374,12 @@ static int grow(const Plan* plan, Vec3 root, Vec3* path)
     path[count++] = root;
     Vec3 p = root;
     Vec3 normal = mannequin_normal(root);
-    // Rises at the crown, lies flat at the nape, where hair from above has to pass over it.
-    float rise = 0.10f + 0.50f * smooth((root.y - 0.17f) / 0.12f);
+    // Rises at the crown, but not so that a parting becomes a ditch; lies flat at the nape, where
+    // hair from above has to pass over it.
+    float rise = 0.10f + 0.12f * smooth((root.y - 0.17f) / 0.12f);
     Vec3 direction = unit(vec3_mad(comb(plan, root, normal), normal, rise));
     for (float along = STEP_M; along < look->most_m && count < PATH_POINTS; along += STEP_M) {
-        float lift = look->lift_m * smooth(along / 0.05f + 0.12f);
+        float lift = look->lift_m * smooth(along / 0.08f + 0.10f);
         Vec3 want = heading(plan, p, along, lift);
         direction = unit(vec3_lerp(direction, want, 0.30f));
         Vec3 next = keep_off(vec3_mad(p, direction, STEP_M), lift);
@@ -454,11 +456,11 @@ static void fill_set(Hairstyle* style)
         .guide_count = style->guide_count,
         .triangle_count = style->triangle_count,
         .strand_count = 2600,
-        .points = 12,
+        .points = 17,
         .root_width_m = 0.0026f,
         .tip_width_m = 0.0034f,
         .fibres = 9.0f,
-        .jitter_m = 0.010f,
+        .jitter_m = 0.009f,
     };
 }
 
@@ -536,7 +538,7 @@ Hairstyle* groom_bob(Fault* fault)
         .parting_end_m = -0.030f,
         .lift_m = 0.015f,
         .sweep = 0.0f,
-        .fringe = 0.8f,
+        .fringe = 0.7f,
         .face_m = 0.055f,
         .gather = 0.0f,
         .gather_z_m = -0.02f,
