@@ -143,8 +143,11 @@ static AssembleResult lane_put(Lane* lane, const StylePart* part, int64_t now_us
                   lane->part_bytes == part_bytes;
     if (lane->bytes != NULL && !agrees) {
         if (now_us - lane->heard_us < SPLIT_US) {
-            fault_set(fault, "style %016llx: a part of a %u-byte lane among those of %u bytes",
-                      (unsigned long long)part->style_hash, part->lane_bytes, lane->size);
+            fault_set(fault,
+                      "style %016llx: a part of another split (%u parts of %u bytes, %u in all) "
+                      "among those of %d parts of %u bytes, %u in all",
+                      (unsigned long long)part->style_hash, part->parts, part_bytes,
+                      part->lane_bytes, lane->parts, lane->part_bytes, lane->size);
             return ASSEMBLE_REJECTED;
         }
         lane_forget(lane);

@@ -4,7 +4,9 @@
 #include "client/options.h"
 #include "client/output.h"
 #include "client/playback.h"
+#include "client/replace.h"
 #include "client/stats.h"
+#include "client/video.h"
 #include "server/daemon.h"
 
 #include <inttypes.h>
@@ -14,13 +16,30 @@
 #include <string.h>
 #include <unistd.h>
 
-// Set by SIGINT and SIGTERM; a handler may touch nothing else.
+// Set by SIGINT, SIGTERM and SIGHUP; what else the handler does must be safe in one.
 static volatile sig_atomic_t stop_asked;
 
+// The second time ends the process at once, without what was half written. But not for SIGHUP: a
+// closed terminal sends it twice, by the kernel and by the shell.
 static void ask_stop(int signal_number)
 {
-    (void)signal_number;
+    if (stop_asked && signal_number != SIGHUP) {
+        video_kill_all();
+        replace_unlink_parts();
+        signal(signal_number, SIG_DFL);
+        raise(signal_number); // comes when this handler returns
+    }
     stop_asked = 1;
+}
+
+static void catch_signals(void)
+{
+    struct sigaction action = {.sa_handler = ask_stop}, before;
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGHUP, NULL, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, NULL); // nohup ignores it
+    signal(SIGXFSZ, SIG_IGN); // writing fails with EFBIG instead, and that is said
 }
 
 typedef struct Client {
@@ -37,9 +56,14 @@ typedef struct Client {
     Drain* drain;
     Playback* playback;
     Daemon* daemon;
-    int64_t last_new_us, last_line_us;
+    int64_t last_line_us;
+    int64_t progress_us;      // when a picture or a part of its style came last
+    int64_t heard_us;         // when rows came last
+    uint64_t awaited_hash;    // a style that is not here yet, and how much of it was
+    int most_progress;        // (receive_style_progress)
     int64_t waiting_since_us; // rows have come and are not drawn yet; 0: all are
     int64_t drawn;
+    bool is_stopped; // before the end that was asked for
 } Client;
 
 static void say(void* context, const char* text)
@@ -75,9 +99,14 @@ static bool picture(Client* client, const Hairstyle* style, int version, Fault* 
     return output_picture(client->output, &client->image, fault);
 }
 
+static bool has_frames(const Client* client)
+{
+    return client->options.frames > 0 && client->drawn >= client->options.frames;
+}
+
 static bool enough(const Client* client)
 {
-    return stop_asked || (client->options.frames > 0 && client->drawn >= client->options.frames);
+    return stop_asked || has_frames(client);
 }
 
 // Rows of a tick come in several messages, paced over the tick: drawn when the last is there, or
@@ -89,7 +118,7 @@ static bool enough(const Client* client)
 static bool follow(Client* client, int64_t now_us, bool* has_style, Fault* fault)
 {
     if (receive_take(client->receive, &client->view)) {
-        client->last_new_us = now_us;
+        client->heard_us = now_us;
         if (client->waiting_since_us == 0) client->waiting_since_us = now_us;
     }
     int version;
@@ -120,6 +149,48 @@ static bool exact_picture(Client* client, int32_t tick, Fault* fault)
     return picture(client, style, version, fault);
 }
 
+// A stop before the end that was asked for: what was drawn is kept, but it is not what was wanted.
+static bool fault_stopped(Client* client, int64_t wanted, Fault* fault)
+{
+    client->is_stopped = true;
+    return fault_set(fault, "stopped after %" PRId64 " of %" PRId64 " pictures", client->drawn,
+                     wanted);
+}
+
+// Of a style that is awaited: one more part than ever.
+static bool style_comes(Client* client)
+{
+    int held, parts;
+    uint64_t hash = client->view.style_hash;
+    if (hash != client->awaited_hash) client->most_progress = 0;
+    client->awaited_hash = hash;
+    int progress = receive_style_progress(client->receive, hash, &held, &parts);
+    if (progress <= client->most_progress) return false;
+    client->most_progress = progress;
+    return true;
+}
+
+static bool check_timeout(Client* client, int64_t now_us, Fault* fault)
+{
+    const Options* options = &client->options;
+    int64_t timeout_us = (int64_t)(options->timeout_s * 1e6);
+    if (timeout_us == 0 || now_us - client->progress_us <= timeout_us) return true;
+    if (client->heard_us == 0 || now_us - client->heard_us > timeout_us)
+        return fault_set(fault,
+                         "nothing new for slot %d in %g s: no hair-server on %s, or none of its "
+                         "characters has that slot",
+                         options->slot, options->timeout_s,
+                         options->url ? options->url : "this bus");
+    int held, parts;
+    receive_style_progress(client->receive, client->view.style_hash, &held, &parts);
+    char part_text[40] = "no part";
+    if (parts > 0) snprintf(part_text, sizeof part_text, "%d of %d parts", held, parts);
+    return fault_set(fault,
+                     "guides of slot %d come, but their style does not (held %s, nothing new in "
+                     "%g s): does its hair-server hear requests, and is the network sound?",
+                     options->slot, part_text, options->timeout_s);
+}
+
 static bool run_bus(Client* client, Fault* fault)
 {
     client->drain = drain_start(client->options.url, client->receive, client->notice, fault);
@@ -128,36 +199,57 @@ static bool run_bus(Client* client, Fault* fault)
         printf("ready: slot %d, %s\n", client->options.slot, client->gl->renderer);
         fflush(stdout);
     }
-    client->last_new_us = base_monotonic_us();
+    client->progress_us = base_monotonic_us();
     while (!enough(client)) {
         int64_t now = base_monotonic_us(), drawn = client->drawn;
         bool has_style;
         if (!follow(client, now, &has_style, fault)) return false;
+        // Guides alone are no progress: without their style nothing of them can be drawn.
+        if (client->drawn > drawn || (!has_style && style_comes(client))) client->progress_us = now;
         if (client->drawn == drawn) base_sleep_until_us(now + 1000);
         progress(client, has_style ? "drawing" : "waiting for the style");
         if (!drain_running(client->drain)) return fault_set(fault, "the bus is gone");
-        double waited_s = (double)(now - client->last_new_us) * 1e-6;
-        if (client->options.timeout_s > 0 && waited_s > client->options.timeout_s)
-            return fault_set(fault,
-                             "nothing new for slot %d in %g s: no hair-server on %s, or none of "
-                             "its characters has that slot",
-                             client->options.slot, client->options.timeout_s,
-                             client->options.url ? client->options.url : "this bus");
+        if (!check_timeout(client, now, fault)) return false;
     }
+    int64_t frames = client->options.frames;
     bool has_style;
-    bool is_full = client->options.frames > 0 && client->drawn >= client->options.frames;
-    return is_full || follow(client, base_monotonic_us(), &has_style, fault);
+    if (frames > 0 && client->drawn >= frames) return true;
+    if (!follow(client, base_monotonic_us(), &has_style, fault)) return false;
+    return frames == 0 || client->drawn >= frames || fault_stopped(client, frames, fault);
+}
+
+// How many ticks of `first` to `last` are to be drawn.
+static int64_t wanted_ticks(const Options* options, int64_t first, int64_t last)
+{
+    int64_t ticks = last < first ? 0 : (last - first) / options->tick_step + 1;
+    return options->frames > 0 && options->frames < ticks ? options->frames : ticks;
+}
+
+// Before anything is drawn: a range that passes the log's end would be found out at its end.
+static bool check_range(const Client* client, Fault* fault)
+{
+    const Options* options = &client->options;
+    int64_t wanted = wanted_ticks(options, options->first_tick, options->last_tick);
+    int64_t last = options->first_tick + (wanted - 1) * options->tick_step;
+    int32_t held_first = playback_first_tick(client->playback);
+    int32_t held_last = playback_last_tick(client->playback);
+    if (options->first_tick >= held_first && last <= held_last) return true;
+    return fault_set(fault, "tick %" PRId64 " is not in %s (it holds %d..%d)",
+                     options->first_tick < held_first ? options->first_tick : last, options->log,
+                     (int)held_first, (int)held_last);
 }
 
 static bool run_log(Client* client, Fault* fault)
 {
     Options* options = &client->options;
+    if (options->has_ticks && !check_range(client, fault)) return false;
     if (!playback_feed_styles(client->playback, client->receive, fault)) return false;
     int32_t first =
         options->has_ticks ? options->first_tick : playback_first_tick(client->playback);
     int32_t last = options->has_ticks ? options->last_tick : playback_last_tick(client->playback);
     Fault cut = {""};
-    for (int64_t tick = first; tick <= last && !enough(client); tick += options->tick_step) {
+    int64_t tick = first;
+    for (; tick <= last && !enough(client); tick += options->tick_step) {
         // A logger seldom starts or stops between two ticks: one that it cut is left out.
         bool may_be_cut = !options->has_ticks && (tick == first || tick == last);
         if (!playback_feed_tick(client->playback, (int32_t)tick, client->receive,
@@ -169,7 +261,9 @@ static bool run_log(Client* client, Fault* fault)
         if (!exact_picture(client, (int32_t)tick, fault)) return false;
         progress(client, "drawing");
     }
-    return client->drawn > 0 || stop_asked || fault_set(fault, "%s", cut.text);
+    if (tick <= last && !has_frames(client))
+        return fault_stopped(client, wanted_ticks(options, first, last), fault);
+    return client->drawn > 0 || fault_set(fault, "%s", cut.text);
 }
 
 static void take_message(void* context, int64_t utime, const char* channel, const uint8_t* bytes,
@@ -184,19 +278,20 @@ static bool run_embedded(Client* client, Fault* fault)
     Options* options = &client->options;
     daemon_add_sink(client->daemon, (DaemonSink){take_message, client});
     daemon_publish_styles(client->daemon);
+    int64_t first = options->has_ticks ? options->first_tick : 0;
     int64_t last = options->has_ticks    ? options->last_tick
                    : options->frames > 0 ? options->frames - 1
                                          : 59;
-    for (int64_t tick = 0; tick <= last && !enough(client); ++tick) {
+    int64_t tick = 0;
+    for (; tick <= last && !enough(client); ++tick) {
         daemon_tick(client->daemon);
         daemon_publish_slice(client->daemon, 0, 1);
-        bool wanted =
-            !options->has_ticks ||
-            (tick >= options->first_tick && (tick - options->first_tick) % options->tick_step == 0);
+        bool wanted = tick >= first && (tick - first) % options->tick_step == 0;
         if (wanted && !exact_picture(client, (int32_t)tick, fault)) return false;
         progress(client, "drawing");
     }
-    return true;
+    int64_t asked = wanted_ticks(options, first, last);
+    return client->drawn >= asked || fault_stopped(client, asked, fault);
 }
 
 static bool open_source(Client* client, double* rate_hz, Fault* fault)
@@ -296,21 +391,31 @@ static bool report(Client* client, Fault* fault)
            stats_write(options->stats, &client->drawing, &client->view, &counters, hair, fault);
 }
 
+// A run that failed must not cost the good file of an earlier one; one that was stopped keeps what
+// it has drawn.
+static bool close_output(Client* client, bool done, Fault* fault)
+{
+    bool is_kept = done || (client->is_stopped && client->drawn > 0);
+    output_tell_older(client->output, &client->notice);
+    if (is_kept) return output_close(client->output, fault);
+    output_abandon(client->output);
+    return true;
+}
+
 int main(int argc, char** argv)
 {
     static Client client; // large, and its address is given to threads
     client.options = options_parse(argc, argv);
     client.notice = (Notice){say, &client};
-    struct sigaction action = {.sa_handler = ask_stop, .sa_flags = SA_RESETHAND}; // again: at once
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
+    catch_signals();
 
     Fault fault = {""}, second = {""};
     bool done = open_all(&client, &fault) && run(&client, &fault);
     end_progress(&client);
     if (client.can_draw && !report(&client, done ? &fault : &second)) done = false;
-    if (!output_close(client.output, done ? &fault : &second)) done = false;
+    if (!close_output(&client, done, done ? &fault : &second)) done = false;
     close_all(&client);
+    if (done && !base_stdout_written(&fault)) done = false;
     if (fault.text[0] != '\0') fprintf(stderr, "hair-client: %s\n", fault.text);
     if (second.text[0] != '\0' && strcmp(second.text, fault.text) != 0)
         fprintf(stderr, "hair-client: %s\n", second.text);

@@ -6,6 +6,7 @@
 #include "messages/style.h"
 
 #include <argp.h>
+#include <assert.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,13 +23,29 @@ typedef struct ChannelInfo {
     int64_t count, bytes, first_us, last_us;
 } ChannelInfo;
 
-// Ticks of one slot in one epoch.
+// Rows of one tick, of one block or of several that follow each other.
+typedef struct Rows {
+    int32_t tick;
+    uint16_t slot, first, end;
+    uint8_t epoch, style; // indices in Info's tables; style NO_STYLE: too many styles
+} Rows;
+
+#define NO_STYLE UINT8_MAX
+
+// One slot in one epoch.
 typedef struct SlotInfo {
     bool any;
-    int32_t first, last;
-    int64_t missing;  // ticks between first and last of which nothing was recorded
-    int64_t backward; // blocks older than the one before them
+    int32_t newest;
+    size_t rows;      // 1 + index of its last Rows
+    int64_t backward; // blocks older than the newest before them
 } SlotInfo;
+
+// What its ticks come to.
+typedef struct TickInfo {
+    int32_t first, last;
+    int64_t ticks;      // of which anything was recorded
+    int64_t incomplete; // of these, without some rows of their style
+} TickInfo;
 
 typedef struct EpochInfo {
     int64_t epoch;
@@ -42,10 +59,14 @@ typedef struct StyleInfo {
     bool complete;
     char name[HAIRSTYLE_NAME_BYTES];
     int guides, nodes;
+    int rows; // that blocks were seen to hold: its guides, where the style itself is missing
     int64_t strands;
 } StyleInfo;
 
-// Everything that `info` gathers in its one pass. Tables are fixed: logs come from strangers.
+static_assert(MAX_EPOCHS <= UINT8_MAX && MAX_STYLES <= NO_STYLE, "Rows holds their indices");
+
+// Everything that `info` gathers in its one pass. Tables are fixed: logs come from strangers. Only
+// `rows` grows: 12 bytes for a block that cost the log 150 or more.
 typedef struct Info {
     const char* path;
     int64_t size, events, damaged, first_us, last_us;
@@ -58,6 +79,8 @@ typedef struct Info {
     StyleInfo styles[MAX_STYLES];
     int style_count;
     int64_t other_styles;
+    Rows* rows;
+    size_t row_count, row_capacity;
     Assemble* assemble;
 } Info;
 
@@ -101,28 +124,6 @@ static EpochInfo* find_epoch(Info* info, int64_t epoch)
     return &info->epochs[info->epoch_count++];
 }
 
-static void count_block(Info* info, const LogEvent* event)
-{
-    FrameHeader header;
-    const uint8_t *positions, *tangents;
-    FrameFault fault = frame_decode(&header, &positions, &tangents, event->data, event->size);
-    if (fault != FRAME_OK || header.slot >= CHANNEL_MAX_SLOTS) {
-        ++info->bad_blocks;
-        return;
-    }
-    EpochInfo* epoch = find_epoch(info, header.epoch);
-    if (epoch == NULL) {
-        ++info->other_epochs;
-        return;
-    }
-    SlotInfo* slot = &epoch->slots[header.slot];
-    if (!slot->any) *slot = (SlotInfo){.any = true, .first = header.tick, .last = header.tick};
-    int64_t step = (int64_t)header.tick - slot->last;
-    if (step > 1) slot->missing += step - 1;
-    if (step < 0) ++slot->backward;
-    if (step > 0) slot->last = header.tick;
-}
-
 static StyleInfo* find_style(Info* info, uint64_t hash)
 {
     for (int i = 0; i < info->style_count; ++i)
@@ -130,6 +131,100 @@ static StyleInfo* find_style(Info* info, uint64_t hash)
     if (info->style_count == MAX_STYLES) return NULL;
     info->styles[info->style_count] = (StyleInfo){.hash = hash};
     return &info->styles[info->style_count++];
+}
+
+static bool add_rows(Info* info, SlotInfo* slot, const Rows* rows)
+{
+    Rows* last = slot->rows > 0 ? &info->rows[slot->rows - 1] : NULL;
+    if (last != NULL && last->tick == rows->tick && last->style == rows->style &&
+        last->end == rows->first) {
+        last->end = rows->end;
+        return true;
+    }
+    if (info->row_count == info->row_capacity) {
+        size_t grown = info->row_capacity > 0 ? info->row_capacity * 2 : 4096;
+        Rows* larger = realloc(info->rows, grown * sizeof *larger);
+        if (larger == NULL) return false;
+        info->rows = larger;
+        info->row_capacity = grown;
+    }
+    info->rows[info->row_count++] = *rows;
+    slot->rows = info->row_count;
+    return true;
+}
+
+static void count_order(SlotInfo* slot, int32_t tick)
+{
+    if (!slot->any) *slot = (SlotInfo){.any = true, .newest = tick};
+    if (tick < slot->newest) ++slot->backward;
+    if (tick > slot->newest) slot->newest = tick;
+}
+
+// False where memory ran out.
+static bool count_block(Info* info, const LogEvent* event)
+{
+    FrameHeader header;
+    const uint8_t *positions, *tangents;
+    FrameFault fault = frame_decode(&header, &positions, &tangents, event->data, event->size);
+    if (fault != FRAME_OK || header.slot >= CHANNEL_MAX_SLOTS) {
+        ++info->bad_blocks;
+        return true;
+    }
+    EpochInfo* epoch = find_epoch(info, header.epoch);
+    if (epoch == NULL) {
+        ++info->other_epochs;
+        return true;
+    }
+    SlotInfo* slot = &epoch->slots[header.slot];
+    count_order(slot, header.tick);
+    Rows rows = {.tick = header.tick,
+                 .slot = header.slot,
+                 .first = header.first_strand,
+                 .end = (uint16_t)(header.first_strand + header.strand_count),
+                 .epoch = (uint8_t)(epoch - info->epochs),
+                 .style = NO_STYLE};
+    StyleInfo* style = find_style(info, header.style_hash);
+    if (style != NULL) rows.style = (uint8_t)(style - info->styles);
+    if (style != NULL && rows.end > style->rows) style->rows = rows.end;
+    return add_rows(info, slot, &rows);
+}
+
+static int compare_rows(const void* a, const void* b)
+{
+    const Rows *left = a, *right = b;
+    if (left->epoch != right->epoch) return left->epoch < right->epoch ? -1 : 1;
+    if (left->slot != right->slot) return left->slot < right->slot ? -1 : 1;
+    if (left->tick != right->tick) return left->tick < right->tick ? -1 : 1;
+    return (left->first > right->first) - (left->first < right->first);
+}
+
+// Whether the sorted `rows` of one tick leave none of its style's out.
+static bool is_whole(const Info* info, const Rows* rows, size_t count)
+{
+    if (rows->style == NO_STYLE) return true; // nobody knows
+    const StyleInfo* style = &info->styles[rows->style];
+    int wanted = style->guides > 0 ? style->guides : style->rows, end = 0;
+    for (size_t i = 0; i < count && rows[i].first <= end; ++i)
+        if (rows[i].end > end) end = rows[i].end;
+    return end >= wanted;
+}
+
+// Takes the ticks of the slot whose sorted rows begin at `*at`, and moves it behind them.
+static TickInfo take_ticks(const Info* info, size_t* at)
+{
+    const Rows* begin = &info->rows[*at];
+    TickInfo ticks = {.first = begin->tick};
+    while (*at < info->row_count) {
+        const Rows* rows = &info->rows[*at];
+        size_t count = 0;
+        if (rows->epoch != begin->epoch || rows->slot != begin->slot) break;
+        for (; *at < info->row_count && info->rows[*at].tick == rows->tick; ++*at, ++count)
+            if (info->rows[*at].epoch != rows->epoch || info->rows[*at].slot != rows->slot) break;
+        ++ticks.ticks;
+        ticks.incomplete += !is_whole(info, rows, count);
+        ticks.last = rows->tick;
+    }
+    return ticks;
 }
 
 static void note_finished(Info* info, StyleInfo* known)
@@ -173,15 +268,18 @@ static bool gather(Info* info, Fault* fault)
     if (reader == NULL) return false;
     if (stat(info->path, &status) == 0) info->size = status.st_size;
     LogEvent event;
-    while (log_next(reader, &event)) {
+    bool has_room = true;
+    while (has_room && log_next(reader, &event)) {
         count_event(info, &event);
         if (strncmp(event.channel, CHANNEL_GUIDES_PREFIX, sizeof CHANNEL_GUIDES_PREFIX - 1) == 0)
-            count_block(info, &event);
+            has_room = count_block(info, &event);
         else if (strcmp(event.channel, CHANNEL_STYLE) == 0)
             count_part(info, &event);
     }
     info->damaged = log_damaged_bytes(reader);
     log_close(reader);
+    if (!has_room) return fault_set(fault, "%s: no memory", info->path);
+    if (info->row_count > 0) qsort(info->rows, info->row_count, sizeof *info->rows, compare_rows);
     if (info->events > 0) return true;
     return fault_set(fault, "%s: not an LCM log: it holds no event (0xEDA1DA01 ...)", info->path);
 }
@@ -209,15 +307,18 @@ static void print_channels(const Info* info)
 
 static void print_epochs(const Info* info)
 {
-    for (int i = 0; i < info->epoch_count; ++i)
-        for (int number = 0; number < CHANNEL_MAX_SLOTS; ++number) {
-            const SlotInfo* slot = &info->epochs[i].slots[number];
-            if (!slot->any) continue;
-            printf("  epoch %" PRId64 " slot %d: ticks %d..%d, %" PRId64 " missing",
-                   info->epochs[i].epoch, number, (int)slot->first, (int)slot->last, slot->missing);
-            if (slot->backward > 0) printf(", %" PRId64 " blocks out of order", slot->backward);
-            putchar('\n');
-        }
+    for (size_t at = 0; at < info->row_count;) {
+        const EpochInfo* epoch = &info->epochs[info->rows[at].epoch];
+        int number = info->rows[at].slot;
+        TickInfo ticks = take_ticks(info, &at);
+        int64_t span = (int64_t)ticks.last - ticks.first + 1, missing = span - ticks.ticks;
+        printf("  epoch %" PRId64 " slot %d: ticks %d..%d, %" PRId64 " missing", epoch->epoch,
+               number, (int)ticks.first, (int)ticks.last, missing);
+        if (ticks.incomplete > 0) printf(", %" PRId64 " incomplete", ticks.incomplete);
+        int64_t backward = epoch->slots[number].backward;
+        if (backward > 0) printf(", %" PRId64 " blocks out of order", backward);
+        putchar('\n');
+    }
     if (info->other_epochs > 0)
         printf("  of more epochs: %" PRId64 " blocks\n", info->other_epochs);
 }
@@ -279,6 +380,7 @@ static bool info_file(const char* path, Fault* fault)
     for (int i = 0; i < info->epoch_count; ++i)
         free(info->epochs[i].slots);
     assemble_destroy(info->assemble);
+    free(info->rows);
     free(info);
     return fine;
 }
@@ -351,5 +453,9 @@ int main(int argc, char** argv)
     Arguments arguments = {0};
     error_t error = argp_parse(&argp, argc, argv, 0, NULL, &arguments);
     if (error != 0) return 2;
-    return arguments.command->run(arguments.files, arguments.file_count);
+    int status = arguments.command->run(arguments.files, arguments.file_count);
+    Fault fault;
+    if (base_stdout_written(&fault)) return status;
+    fprintf(stderr, "hair-log: %s\n", fault.text);
+    return EXIT_FAILURE;
 }

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum {
     KEY_URL = 256,
@@ -67,7 +68,8 @@ static const struct argp_option arguments[] = {
      "draw ticks A to B, both included, or every STEP-th of them (log, embedded)", 0},
     {"epoch", KEY_EPOCH, "E", 0, "of a log that holds several", 0},
     {"frames", KEY_FRAMES, "N", 0, "end after N pictures", 0},
-    {"timeout", KEY_TIMEOUT, "S", 0, "bus: fail if nothing new comes for S seconds", 0},
+    {"timeout", KEY_TIMEOUT, "S", 0,
+     "bus: fail if for S seconds no picture can be drawn and no part of a style comes", 0},
     {0, 0, 0, 0, "What comes out", 4},
     {"out", KEY_OUT, "FILE.png|DIR|FILE.mp4", 0,
      "the last picture, every picture as DIR/00000.png ..., or a film (needs ffmpeg)", 0},
@@ -144,7 +146,8 @@ static void parse_background(struct argp_state* state, const char* value, ShadeO
 {
     unsigned r = 0, g = 0, b = 0;
     if (value[0] == '#') ++value;
-    if (strlen(value) != 6 || sscanf(value, "%2x%2x%2x", &r, &g, &b) != 3)
+    bool is_hex = strlen(value) == 6 && strspn(value, "0123456789abcdefABCDEF") == 6;
+    if (!is_hex || sscanf(value, "%2x%2x%2x", &r, &g, &b) != 3) // which takes signs and spaces
         argp_error(state, "--background %s: want six hex digits RRGGBB, like 898989", value);
     shade->has_background = true;
     shade->background = vec3(linear(r), linear(g), linear(b));
@@ -285,8 +288,48 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
     return 0;
 }
 
+static bool is_same_inode(const struct stat* a, const struct stat* b)
+{
+    return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
+}
+
+// Of the directory that a file of this name is in or would be made in; its own name there.
+static const char* find_parent(const char* path, struct stat* parent)
+{
+    const char* slash = strrchr(path, '/');
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%.*s/", slash != NULL ? (int)(slash - path) : 1,
+             slash != NULL ? path : ".");
+    if (stat(folder, parent) != 0) *parent = (struct stat){0};
+    return slash != NULL ? slash + 1 : path;
+}
+
+// Whether two names lead to one file, or would if it were made. Devices may serve twice.
+static bool is_same_file(const char* a, const char* b)
+{
+    struct stat at_a, at_b;
+    if (a == NULL || b == NULL || strcmp(a, "-") == 0 || strcmp(b, "-") == 0) return false;
+    bool has_a = stat(a, &at_a) == 0, has_b = stat(b, &at_b) == 0;
+    if (has_a && has_b)
+        return (S_ISREG(at_a.st_mode) || S_ISDIR(at_a.st_mode)) && is_same_inode(&at_a, &at_b);
+    if (has_a || has_b) return false;
+    const char *name_a = find_parent(a, &at_a), *name_b = find_parent(b, &at_b);
+    return strcmp(name_a, name_b) == 0 && is_same_inode(&at_a, &at_b);
+}
+
+static void check_files(struct argp_state* state, const Options* options)
+{
+    if (is_same_file(options->stats, options->log))
+        argp_error(state, "--stats %s: would replace the --log", options->stats);
+    if (is_same_file(options->out, options->log))
+        argp_error(state, "--out %s: would replace the --log", options->out);
+    if (is_same_file(options->out, options->stats))
+        argp_error(state, "--stats %s: would replace what --out writes", options->stats);
+}
+
 static void check(struct argp_state* state, const Options* options)
 {
+    check_files(state, options);
     if ((options->log != NULL) + options->embedded + (options->url != NULL) > 1)
         argp_error(state, "choose one of --url, --log and --embedded");
     bool daemon_options =
@@ -306,6 +349,11 @@ static void check(struct argp_state* state, const Options* options)
         argp_error(state, "--transparency hash needs --msaa 2 or 4");
 }
 
+static void refuse_second_range(struct argp_state* state, const Options* options)
+{
+    if (options->has_ticks) argp_error(state, "--tick and --ticks: give one of them, once");
+}
+
 static error_t parse(int key, char* value, struct argp_state* state)
 {
     Options* options = state->input;
@@ -313,11 +361,13 @@ static error_t parse(int key, char* value, struct argp_state* state)
     if (parse_picture(key, value, state, options) == 0) return 0;
     switch (key) {
     case KEY_TICK:
+        refuse_second_range(state, options);
         options->first_tick = options->last_tick =
             (int32_t)integer(state, "tick", value, 0, INT32_MAX);
         options->has_ticks = true;
         break;
     case KEY_TICKS:
+        refuse_second_range(state, options);
         parse_ticks(state, value, options);
         break;
     case KEY_FRAMES:

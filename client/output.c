@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -19,10 +20,26 @@ struct Output {
     int64_t count;
 };
 
+static const char* base_of(const char* path)
+{
+    const char* slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+// Whether the file's name is something and `ending`, in small letters or large.
 static bool ends_with(const char* path, const char* ending)
 {
-    size_t n = strlen(path), m = strlen(ending);
-    return n > m && strcmp(path + n - m, ending) == 0;
+    const char* name = base_of(path);
+    size_t n = strlen(name), m = strlen(ending);
+    return n > m && strcasecmp(name + n - m, ending) == 0;
+}
+
+// A name with a dot was meant as a file, unless it is there as a directory or ends with a slash.
+static bool means_file(const char* path)
+{
+    struct stat info;
+    bool is_directory = stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+    return !is_directory && (strcmp(path, "-") == 0 || strchr(base_of(path), '.') != NULL);
 }
 
 // The directory that a new file of this name would be made in.
@@ -88,13 +105,11 @@ static bool open_target(Output* output, int width, int height, double rate_hz, F
     }
     if (ends_with(output->path, ".png"))
         return check_file(output->path, fault) && image_create(&output->last, width, height, fault);
-    // A name that ends like another kind of picture was not meant as a directory.
-    static const char* const others[] = {".jpg", ".jpeg", ".gif", ".webp", ".bmp",
-                                         ".tga", ".mkv",  ".avi", ".mov",  ".webm"};
-    for (size_t i = 0; i < sizeof others / sizeof *others; ++i)
-        if (ends_with(output->path, others[i]))
-            return fault_set(fault, "--out %.300s: choose a .png, an .mp4 or a directory",
-                             output->path);
+    if (means_file(output->path))
+        return fault_set(fault,
+                         "--out %.300s: choose a .png, an .mp4, or a directory; one with a dot in "
+                         "its name ends with /",
+                         output->path);
     return open_directory(output, fault);
 }
 
@@ -116,13 +131,18 @@ Output* output_open(const char* path, int width, int height, double rate_hz, Fau
     return NULL;
 }
 
+static void number_path(char path[1100], const Output* output, int64_t number)
+{
+    snprintf(path, 1100, "%s/%05lld.png", output->path, (long long)number);
+}
+
 bool output_picture(Output* output, const Image* image, Fault* fault)
 {
     int64_t number = output->count++;
     if (output->video != NULL) return video_frame(output->video, image, fault);
     if (output->to_directory) {
         char path[1100];
-        snprintf(path, sizeof path, "%s/%05lld.png", output->path, (long long)number);
+        number_path(path, output, number);
         return image_write_png(image, path, false, fault);
     }
     if (output->last.rgba != NULL) {
@@ -130,6 +150,26 @@ bool output_picture(Output* output, const Image* image, Fault* fault)
         output->has_last = true;
     }
     return true;
+}
+
+void output_tell_older(const Output* output, const Notice* notice)
+{
+    char path[1100];
+    if (output == NULL || !output->to_directory || output->count == 0) return;
+    number_path(path, output, output->count);
+    if (access(path, F_OK) == 0)
+        notice_say(notice,
+                   "%.300s and those after it are of an earlier run, which drew more than %lld "
+                   "pictures: remove them, or name another directory",
+                   path, (long long)output->count);
+}
+
+void output_abandon(Output* output)
+{
+    if (output == NULL) return;
+    if (output->video != NULL) video_abandon(output->video);
+    image_free(&output->last);
+    free(output);
 }
 
 bool output_close(Output* output, Fault* fault)

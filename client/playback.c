@@ -313,6 +313,15 @@ static void mark_rows(bool rows[HAIRSTYLE_MAX_GUIDES], const LogEvent* event)
         rows[row] = true;
 }
 
+// False where `receive` did not take it: a sound block may still contradict its style.
+static bool feed_block(Receive* receive, const LogEvent* event)
+{
+    ReceiveCounters before = receive_counters(receive);
+    receive_message(receive, event->channel, event->data, event->size, event->utime);
+    ReceiveCounters after = receive_counters(receive);
+    return after.rejected == before.rejected && after.late == before.late;
+}
+
 static bool check_rows(const Playback* playback, int32_t tick, const bool* rows, int guides,
                        Fault* fault)
 {
@@ -348,8 +357,7 @@ bool playback_feed_tick(Playback* playback, int32_t tick, Receive* receive, Faul
     for (; at < playback->block_count && playback->blocks[at].tick == tick; ++at) {
         LogEvent event;
         if (!read_event(playback, playback->blocks[at].offset, &event)) continue;
-        mark_rows(rows, &event);
-        receive_message(receive, event.channel, event.data, event.size, event.utime);
+        if (feed_block(receive, &event)) mark_rows(rows, &event);
     }
     const Hairstyle* style = receive_style(receive, hash, NULL, NULL);
     if (style == NULL)

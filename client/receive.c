@@ -18,6 +18,7 @@ static_assert(RECEIVE_MAX_STYLES == ASSEMBLE_MAX_STYLES, "one bound, named twice
     2000000                  // a lower epoch is believed after this much silence of a higher one
 #define BACKWARD_US  500000  // a jump back is believed after this long without a step forward
 #define HEARD_US     2000000 // styles are asked for while guides are this fresh
+#define GAP_TICKS    600     // of a gap, that are counted as lost
 #define PLANE_VALUES ((size_t)HAIRSTYLE_MAX_GUIDES * HAIRSTYLE_MAX_NODES * 3)
 
 // Latest-wins planes of one slot.
@@ -207,7 +208,8 @@ static void slot_close(Slot* slot, int64_t newest, ReceiveCounters* counters)
     int64_t begun = slot->closed > slot->tick ? slot->closed : slot->tick;
     if (last > begun) {
         int64_t a_tick = (slot->guides + slot->rows_per_message - 1) / slot->rows_per_message;
-        counters->lost += (last - begun) * a_tick;
+        int64_t ticks = last - begun < GAP_TICKS ? last - begun : GAP_TICKS;
+        counters->lost += ticks * a_tick;
     }
     if (last > slot->closed) slot->closed = last;
 }
@@ -522,6 +524,14 @@ bool receive_take(Receive* receive, GuidesView* view)
 const Hairstyle* receive_style(Receive* receive, uint64_t hash, int* version, bool* complete)
 {
     return assemble_find(receive->assemble, hash, version, complete, true);
+}
+
+int receive_style_progress(Receive* receive, uint64_t hash, int* held, int* parts)
+{
+    int version = 0;
+    assemble_find(receive->assemble, hash, &version, NULL, false);
+    assemble_progress(receive->assemble, hash, version == 0 ? STYLE_FAST : STYLE_BULK, held, parts);
+    return version * (STYLE_MAX_PARTS + 1) + *held;
 }
 
 size_t receive_request(Receive* receive, int64_t now_us, uint8_t* bytes, size_t capacity)

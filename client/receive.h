@@ -19,7 +19,8 @@ typedef struct Receive Receive;
 // its slot arrives (so reordering by one tick is not loss); closing counts the messages of T that
 // have not come: with K the largest block seen and G guides (the style's count, or before it is
 // known the highest row seen), the blocks [0,K), [K,2K) ... G of which a row is missing. Ticks of
-// which nothing came count ceil(G/K). Not counted: the first tick after joining, a new epoch, a
+// which nothing came count ceil(G/K), 600 ticks of a gap at most: one forged tick could claim 2^31.
+// Not counted: the first tick after joining, a new epoch, a
 // jump back or receive_restart (one may join in its middle), and the newest two ticks (still open).
 typedef struct ReceiveCounters {
     int64_t datagrams; // messages, accepted or not
@@ -90,6 +91,11 @@ bool receive_take(Receive* receive, GuidesView* view);
 // rises when its bulk lane arrives; `*complete` says that nothing is missing. The pointer stays
 // valid until receive_destroy.
 const Hairstyle* receive_style(Receive* receive, uint64_t hash, int* version, bool* complete);
+
+// How many of how many parts are held of the lane that this style waits for (0 of 0: none came).
+// What is returned rises with every part that brings the style closer, from lane to lane; it falls
+// where the parts made no sound style. Waits while a style is being read.
+int receive_style_progress(Receive* receive, uint64_t hash, int* held, int* parts);
 
 // Writes the request_t that is due now, if any, and returns its size, else 0: parts of styles that
 // the slots wear and that have not come, at most every 300 ms and not while they are still coming.

@@ -2,10 +2,41 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+// Parts that are being written, for a signal handler: no heap, and a name stands before its flag.
+static struct {
+    volatile sig_atomic_t used;
+    char part[sizeof((Replace*)0)->part];
+} pending[4];
+
+static void remember(const Replace* replace)
+{
+    for (size_t i = 0; i < sizeof pending / sizeof *pending; ++i) {
+        if (pending[i].used) continue;
+        strcpy(pending[i].part, replace->part);
+        atomic_signal_fence(memory_order_release);
+        pending[i].used = 1;
+        return;
+    }
+}
+
+static void forget(const Replace* replace)
+{
+    for (size_t i = 0; i < sizeof pending / sizeof *pending; ++i)
+        if (pending[i].used && strcmp(pending[i].part, replace->part) == 0) pending[i].used = 0;
+}
+
+void replace_unlink_parts(void)
+{
+    for (size_t i = 0; i < sizeof pending / sizeof *pending; ++i)
+        if (pending[i].used) unlink(pending[i].part);
+}
 
 static bool in_place(const Replace* replace)
 {
@@ -49,6 +80,7 @@ static int create_part(const Replace* replace)
 {
     if (in_place(replace)) return open(replace->part, O_WRONLY | O_CLOEXEC);
     const int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
+    remember(replace); // before there is a file to forget
     const int file = open(replace->part, flags, 0666);
     if (file >= 0 || errno != EEXIST) return file;
     unlink(replace->part);
@@ -66,6 +98,7 @@ FILE* replace_open(Replace* replace, const char* path, Fault* fault)
         close(descriptor);
         replace_abandon(replace);
     }
+    forget(replace);
     return NULL;
 }
 
@@ -84,7 +117,11 @@ bool replace_close(Replace* replace, FILE* file, Fault* fault)
 
 bool replace_commit(const Replace* replace, Fault* fault)
 {
-    if (in_place(replace) || rename(replace->part, replace->path) == 0) return true;
+    if (in_place(replace)) return true;
+    if (rename(replace->part, replace->path) == 0) {
+        forget(replace);
+        return true;
+    }
     fault_set(fault, "cannot write %s: %s", replace->path, strerror(errno));
     replace_abandon(replace);
     return false;
@@ -92,5 +129,7 @@ bool replace_commit(const Replace* replace, Fault* fault)
 
 void replace_abandon(const Replace* replace)
 {
-    if (!in_place(replace)) unlink(replace->part);
+    if (in_place(replace)) return;
+    unlink(replace->part);
+    forget(replace);
 }

@@ -26,3 +26,7 @@ bool replace_commit(const Replace* replace, Fault* fault);
 
 // Removes what was written.
 void replace_abandon(const Replace* replace);
+
+// For a signal handler that is about to end the process: removes what every Replace has written so
+// far.
+void replace_unlink_parts(void);

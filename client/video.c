@@ -26,6 +26,28 @@ struct Video {
     bool failed;
 };
 
+// The ffmpegs that run, for a signal handler; 0: none.
+static volatile pid_t running[4];
+
+static void note_running(pid_t before, pid_t now)
+{
+    for (size_t i = 0; i < sizeof running / sizeof *running; ++i)
+        if (running[i] == before) {
+            running[i] = now;
+            return;
+        }
+}
+
+// Waited for as well: one that is about to make its file would make it after it was removed.
+void video_kill_all(void)
+{
+    for (size_t i = 0; i < sizeof running / sizeof *running; ++i)
+        if (running[i] != 0) {
+            kill(running[i], SIGKILL);
+            waitpid(running[i], NULL, 0);
+        }
+}
+
 // Crop, not pad: a black line shows, a missing row of background does not. BT.709 is named in full,
 // since players guess by size otherwise. rgb0: alpha is no business of a video.
 static pid_t spawn_ffmpeg(const Video* video, double rate_hz, int input,
@@ -79,6 +101,7 @@ static bool start(Video* video, double rate_hz, int input, Fault* fault)
     video->pid = spawn_ffmpeg(video, rate_hz, input, &actions, &attributes, &error);
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
+    if (video->pid) note_running(0, video->pid);
     if (video->pid) return true;
     if (error == ENOENT)
         return fault_set(fault, "ffmpeg is not installed (apt-get install ffmpeg)");
@@ -148,6 +171,7 @@ static void end_ffmpeg(Video* video)
     video->frames = -1;
     while (video->pid && waitpid(video->pid, &video->status, 0) < 0 && errno == EINTR)
         ;
+    if (video->pid) note_running(video->pid, 0);
     video->pid = 0;
 }
 
@@ -213,6 +237,14 @@ static bool finish(Video* video, Fault* fault)
         return fault_set(fault, "%s: not one frame was drawn, no video is written",
                          video->replace.path);
     return true;
+}
+
+void video_abandon(Video* video)
+{
+    if (video->pid) kill(video->pid, SIGKILL); // nothing of it is wanted
+    end_ffmpeg(video);
+    replace_abandon(&video->replace);
+    free_video(video);
 }
 
 bool video_close(Video* video, Fault* fault)

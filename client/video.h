@@ -19,3 +19,10 @@ bool video_frame(Video* video, const Image* image, Fault* fault);
 
 // Ends the file, waits for ffmpeg and frees `video` in any case. False with ffmpeg's last words.
 bool video_close(Video* video, Fault* fault);
+
+// Frees `video` without a file: what was there stays.
+void video_abandon(Video* video);
+
+// For a signal handler that is about to end the process: ends every ffmpeg that runs, so that none
+// makes its file again.
+void video_kill_all(void);

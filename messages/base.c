@@ -36,6 +36,15 @@ void notice_say(const Notice* notice, const char* format, ...)
     notice->say(notice->context, text);
 }
 
+bool base_stdout_written(Fault* fault)
+{
+    errno = 0;
+    if (fflush(stdout) == 0 && !ferror(stdout)) return true;
+    // The reason of a write that failed long ago is no longer known.
+    return fault_set(fault, "cannot write to standard output: %s",
+                     errno != 0 ? strerror(errno) : "a write failed");
+}
+
 static int64_t clock_us(clockid_t clock)
 {
     struct timespec now;

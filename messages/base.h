@@ -1,4 +1,5 @@
-// What every file stands on: one-line faults, notices, clocks. Nothing else belongs here.
+// What every file stands on: one-line faults, notices, clocks, and whether what was printed came
+// through. Nothing else belongs here.
 //
 // Three degrees of doubt: assert() for our own bugs (bytes from outside never reach one), a Fault
 // for what the world did wrong, a Notice for what the user should know while work goes on.
@@ -33,6 +34,10 @@ typedef struct Notice {
 
 void notice_say(const Notice* notice, const char* format, ...)
     __attribute__((format(printf, 2, 3)));
+
+// At a program's end: false with a fault where standard output did not take all of what was printed
+// (a full disk, a closed pipe). What it cannot say would otherwise be lost with status 0.
+bool base_stdout_written(Fault* fault);
 
 // Monotonic clock in microseconds: for pacing and timeouts only, never for physics.
 int64_t base_monotonic_us(void);

@@ -125,6 +125,14 @@ static bool is_reflectance(Vec3 c)
     return in_range(c.x, 0.0f, 1.0f) && in_range(c.y, 0.0f, 1.0f) && in_range(c.z, 0.0f, 1.0f);
 }
 
+bool hairstyle_is_name(const char* text)
+{
+    size_t length = strnlen(text, HAIRSTYLE_NAME_BYTES);
+    for (size_t i = 0; i < length; ++i)
+        if (text[i] < ' ' || text[i] > '~') return false;
+    return length > strspn(text, " ") && length < HAIRSTYLE_NAME_BYTES;
+}
+
 static bool is_name(const char name[HAIRSTYLE_NAME_BYTES])
 {
     for (int i = 0; i < HAIRSTYLE_NAME_BYTES; ++i) {
@@ -174,8 +182,9 @@ static bool check_look(const Hairstyle* style, Fault* fault)
         return fault_set(fault, "material: colours are linear reflectances from 0 to 1");
     if (style->head_kind < HEAD_NONE || style->head_kind > HEAD_MESH)
         return fault_set(fault, "head kind %d: 0 none, 1 mannequin or 2 mesh", style->head_kind);
-    if (!near_head(style->head_centre)) return fault_set(fault, "head centre: must be finite");
-    return true;
+    return near_head(style->head_centre) ||
+           fault_set(fault, "head centre is %.4g m away, at most %g: is the unit right (--unit)?",
+                     (double)vec3_length(style->head_centre), (double)FARTHEST_M);
 }
 
 static bool check_triangles(const Hairstyle* style, Fault* fault)

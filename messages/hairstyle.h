@@ -128,6 +128,10 @@ float hairstyle_guide_length(const Hairstyle* style, int guide);
 // Unit tangents of all guides at rest, [guide][node] as `rest`; free them. NULL without memory.
 Vec3* hairstyle_rest_tangents(const Hairstyle* style);
 
+// Whether `text` may be a style's name: 1 to 31 printable ASCII characters, as messages carry, and
+// not only spaces.
+bool hairstyle_is_name(const char* text);
+
 // Whole-structure audit: every count within its cap, every index inside its table, every number
 // finite, sets covering the guides without overlap. Decoders and importers end with it, so that
 // nobody after them checks again.

@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -54,7 +55,8 @@ LogReader* log_open(const char* path, Fault* fault)
     }
     reader->file = file;
     reader->audited = reader->damaged = 0;
-    log_rewind(reader);
+    reader->offset = 0;
+    reader->start = reader->end = 0;
     return reader;
 }
 
@@ -65,10 +67,16 @@ void log_close(LogReader* reader)
     free(reader);
 }
 
+// What is in the window is not read again: a player seeks to each event of a tick, and they lie
+// side by side.
 void log_seek(LogReader* reader, int64_t offset)
 {
-    reader->offset = offset < 0 ? 0 : offset;
-    reader->start = reader->end = 0;
+    if (offset < 0) offset = 0;
+    int64_t window = reader->offset - (int64_t)reader->start; // in the file
+    bool inside = offset >= window && offset - window <= (int64_t)reader->end;
+    reader->start = inside ? (size_t)(offset - window) : 0;
+    if (!inside) reader->end = 0;
+    reader->offset = offset;
 }
 
 void log_rewind(LogReader* reader)
@@ -195,37 +203,74 @@ bool log_next(LogReader* reader, LogEvent* event)
 // ends, and stdio does not say how much of its buffer went out.
 struct LogWriter {
     int file;
+    bool is_regular; // not a device
+    bool is_new;     // this writer has made the file
     int64_t number, flushed_bytes, flushed_us;
     bool failed;
-    char path[256];
+    char* path;
     size_t size;
     uint8_t buffer[WRITE_BUFFER_BYTES];
 };
 
+// Without O_TRUNC: what is there stays until there is something to put in its place.
+static int open_for_writing(const char* path, bool overwrite, bool* is_new)
+{
+    int flags = O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK; // a pipe is refused, not waited for
+    int file = open(path, flags | O_EXCL, 0666);
+    *is_new = file >= 0;
+    return file < 0 && errno == EEXIST && overwrite ? open(path, flags, 0666) : file;
+}
+
+static bool fault_open(const char* path, int reason, Fault* fault)
+{
+    if (reason == ENXIO) // a pipe that nobody reads
+        return fault_set(fault, "%.200s: not a file; a recording must be one", path);
+    const char* fix = reason == EEXIST
+                          ? "; choose another name, remove it, or let it be replaced (--overwrite)"
+                          : "";
+    return fault_set(fault, "%.200s: %s%s", path, strerror(reason), fix);
+}
+
+// Two that write one file would cut each other's events. A file system without locks is believed.
+static bool check_target(int file, const char* path, bool* is_regular, Fault* fault)
+{
+    struct stat status;
+    if (fstat(file, &status) != 0) return fault_open(path, errno, fault);
+    *is_regular = S_ISREG(status.st_mode);
+    if (!*is_regular && !S_ISCHR(status.st_mode))
+        return fault_set(fault, "%.200s: not a file; a recording must be one", path);
+    if (*is_regular && flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        return fault_set(fault, "%.200s: another program is recording into it; choose another name",
+                         path);
+    return true;
+}
+
 LogWriter* log_create(const char* path, bool overwrite, Fault* fault)
 {
-    int flags = O_WRONLY | O_CREAT | O_CLOEXEC | (overwrite ? O_TRUNC : O_EXCL);
-    int file = open(path, flags, 0666);
+    bool is_new, is_regular = false;
+    int file = open_for_writing(path, overwrite, &is_new);
     if (file < 0) {
-        const char* fix =
-            errno == EEXIST
-                ? "; choose another name, remove it, or let it be replaced (--overwrite)"
-                : "";
-        fault_set(fault, "%.200s: %s%s", path, strerror(errno), fix);
+        fault_open(path, errno, fault);
         return NULL;
     }
-    LogWriter* writer = malloc(sizeof *writer);
-    if (writer == NULL) {
+    if (!check_target(file, path, &is_regular, fault)) {
         close(file);
+        return NULL;
+    }
+    LogWriter* writer = calloc(1, sizeof *writer);
+    char* kept = strdup(path);
+    if (writer == NULL || kept == NULL) {
+        close(file);
+        free(writer);
+        free(kept);
         fault_set(fault, "%.200s: no memory", path);
         return NULL;
     }
     writer->file = file;
-    writer->number = writer->flushed_bytes = 0;
+    writer->is_new = is_new;
+    writer->is_regular = is_regular;
     writer->flushed_us = base_monotonic_us();
-    writer->failed = false;
-    writer->size = 0;
-    snprintf(writer->path, sizeof writer->path, "%.200s", path);
+    writer->path = kept;
     return writer;
 }
 
@@ -259,6 +304,9 @@ static bool fail(LogWriter* writer, size_t written, int reason, Fault* fault)
 static bool flush(LogWriter* writer, Fault* fault)
 {
     size_t written = 0;
+    // Now the earlier recording goes, and not before.
+    bool is_first = writer->flushed_bytes == 0 && writer->size > 0 && writer->is_regular;
+    if (is_first && ftruncate(writer->file, 0) != 0) return fail(writer, 0, errno, fault);
     while (written < writer->size) {
         ssize_t put = write(writer->file, writer->buffer + written, writer->size - written);
         if (put < 0 && errno == EINTR) continue;
@@ -302,8 +350,11 @@ bool log_finish(LogWriter* writer, Fault* fault)
         !writer->failed
             ? flush(writer, fault)
             : fault_set(fault, "%.200s: incomplete: an earlier write failed", writer->path);
+    // An empty file is no log: it would only stop the next attempt.
+    if (writer->is_new && writer->is_regular && writer->flushed_bytes == 0) unlink(writer->path);
     if (close(writer->file) != 0 && finished)
         finished = fault_set(fault, "%.200s: %s", writer->path, strerror(errno));
+    free(writer->path);
     free(writer);
     return finished;
 }

@@ -31,7 +31,9 @@ int64_t log_damaged_bytes(const LogReader* reader);
 
 typedef struct LogWriter LogWriter;
 
-// Creates `path`; refuses to write over a file that exists unless `overwrite`.
+// Creates `path`; refuses to write over a file that exists unless `overwrite`, and one that another
+// program records into. What is there is lost with the first bytes that are written, not before; a
+// file that was made here and never written is taken away again.
 LogWriter* log_create(const char* path, bool overwrite, Fault* fault);
 // Events are buffered for at most 0.1 s (as calls go) or 64 KiB. False with a fault on the first
 // failed write (disk full): the file then ends with the last complete event, and later calls are

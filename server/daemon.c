@@ -16,6 +16,7 @@
 #define MAX_STYLES     SCENE_MAX_STYLES
 #define EPOCH_LISTEN_S 2.0 // a daemon yields to a higher epoch only while it is new
 #define APPLIED_BYTES  1400
+#define ADD_PATIENCE_S 1.5 // for the add of a character whose poses come already
 
 // Things that are noticed once each.
 #define COMPLAINTS(X)                                                                              \
@@ -24,6 +25,7 @@
     X(REQUEST)                                                                                     \
     X(STATUS)                                                                                      \
     X(CHANNEL)                                                                                     \
+    X(UNSENT)                                                                                      \
     X(OVERFLOW)                                                                                    \
     X(STYLE)                                                                                       \
     X(EMPTY_SLOT)                                                                                  \
@@ -70,6 +72,7 @@ struct Daemon {
     int order[CHANNEL_MAX_SLOTS]; // numbers of the slots in use, rising
     int used;
     int32_t segments[CHANNEL_MAX_SLOTS]; // outlive a character that leaves and comes back
+    int64_t orphans[CHANNEL_MAX_SLOTS];  // 1 + step of the first pose without a character; 0: none
     Inputs inputs;
     Publisher publisher;
     int64_t steps;      // ticks done since the start; step n simulates (n - 1) / rate to n / rate
@@ -101,12 +104,18 @@ bool daemon_use_scene(DaemonOptions* options, const char* path, Fault* fault)
     return true;
 }
 
-static void complain(Daemon* daemon, Complaint kind, const char* text)
+static void remark(Daemon* daemon, Complaint kind, const char* text)
 {
-    ++daemon->rejected;
     if (daemon->complained[kind]) return;
     daemon->complained[kind] = true;
     notice_say(&daemon->options.notice, "%s (said once; later ones are counted)", text);
+}
+
+// Of what is refused.
+static void complain(Daemon* daemon, Complaint kind, const char* text)
+{
+    ++daemon->rejected;
+    remark(daemon, kind, text);
 }
 
 // Characters -------------------------------------------------------------------------------------
@@ -158,10 +167,8 @@ static void start_slot(const Daemon* daemon, Slot* slot)
     sim_reset(slot->sim, rotation);
 }
 
-static bool add_slot(Daemon* daemon, int number, int style, const Motion* motion, Vec3d position,
-                     Fault* fault)
+static SimDefinition definition_of(const Daemon* daemon, const Hairstyle* hair)
 {
-    const Hairstyle* hair = daemon->styles[style].hair;
     SimDefinition definition = daemon->sim;
     definition.strands = hair->guide_count;
     definition.nodes = hair->nodes;
@@ -169,6 +176,14 @@ static bool add_slot(Daemon* daemon, int number, int style, const Motion* motion
     definition.weight = hair->weight;
     definition.colliders = hair->colliders;
     definition.collider_count = hair->collider_count;
+    return definition;
+}
+
+static bool add_slot(Daemon* daemon, int number, int style, const Motion* motion, Vec3d position,
+                     Fault* fault)
+{
+    const Hairstyle* hair = daemon->styles[style].hair;
+    SimDefinition definition = definition_of(daemon, hair);
     free_slot(daemon, number);
     Slot* slot = calloc(1, sizeof *slot);
     if (slot == NULL) return fault_set(fault, "no memory for character %d", number);
@@ -187,6 +202,7 @@ static bool add_slot(Daemon* daemon, int number, int style, const Motion* motion
     slot->motion = motion;
     slot->base = (Pose){position, quat_identity()};
     slot->segment = daemon->segments[number];
+    daemon->orphans[number] = 0;
     poses_init(&slot->poses, slot->base, 1.0 / daemon->sim.rate_hz);
     start_slot(daemon, slot);
     order_slots(daemon);
@@ -206,6 +222,15 @@ static bool check_parts(const StyleBytes* bytes, int mtu, Fault* fault)
                      size, parts, STYLE_MAX_PARTS);
 }
 
+// Now, not when the first character comes: by then nobody is looking.
+static bool check_simulation(const Daemon* daemon, const Hairstyle* hair, Fault* fault)
+{
+    SimDefinition definition = definition_of(daemon, hair);
+    Sim* trial = sim_create(&definition, fault);
+    sim_destroy(trial);
+    return trial != NULL;
+}
+
 static bool load_one(Daemon* daemon, const LoadOptions* load, const char* name, Fault* fault)
 {
     Style* style = &daemon->styles[daemon->style_count];
@@ -217,7 +242,7 @@ static bool load_one(Daemon* daemon, const LoadOptions* load, const char* name, 
         !check_parts(&style->publish.bytes, daemon->options.mtu, fault))
         return fault_prefix(fault, style->hair->name);
     publish_style_restart(&style->publish);
-    return true;
+    return check_simulation(daemon, style->hair, fault);
 }
 
 static bool load_styles(Daemon* daemon, Fault* fault)
@@ -392,6 +417,14 @@ static void reject_style(Daemon* daemon, const char* name)
     complain(daemon, COMPLAINT_STYLE, text);
 }
 
+// Senders repeat an add each second: a pose may well come before the add that a daemon hears.
+static bool may_be_early(Daemon* daemon, int number)
+{
+    int64_t* since = &daemon->orphans[number];
+    if (*since == 0) *since = 1 + daemon->steps;
+    return (double)(1 + daemon->steps - *since) < ADD_PATIENCE_S * daemon->sim.rate_hz;
+}
+
 static void apply_character(Daemon* daemon, const CharacterMessage* message)
 {
     if (message->verb == CHARACTER_REMOVE) {
@@ -419,7 +452,9 @@ static void apply_character(Daemon* daemon, const CharacterMessage* message)
 static void apply_pose(Daemon* daemon, const PoseMessage* message)
 {
     Slot* slot = daemon->slots[message->slot];
-    if (slot == NULL)
+    if (slot == NULL && may_be_early(daemon, message->slot))
+        ++daemon->rejected;
+    else if (slot == NULL)
         complain(daemon, COMPLAINT_EMPTY_SLOT, "a pose for a slot without a character");
     else if (slot->motion->at != NULL)
         complain(daemon, COMPLAINT_POSE_IN_CODE,
@@ -603,6 +638,21 @@ static FrameHeader header_of(const Daemon* daemon, const Slot* slot)
                          .profile = FRAME_PROFILE_FULL};
 }
 
+static void remark_unsent(Daemon* daemon, const Slot* slot)
+{
+    char text[200];
+    Vec3d at = slot->head.position;
+    if (pose_is_near(at))
+        snprintf(text, sizeof text, "character %d is not sent: is the clock before 1970?",
+                 slot->number);
+    else
+        snprintf(text, sizeof text,
+                 "character %d is not sent: its head at %g %g %g m must be within %g m of the "
+                 "origin",
+                 slot->number, at.x, at.y, at.z, POSE_FARTHEST_M);
+    remark(daemon, COMPLAINT_UNSENT, text);
+}
+
 void daemon_publish_slice(Daemon* daemon, int slice, int slices)
 {
     int64_t total = 0, message = 0;
@@ -616,8 +666,9 @@ void daemon_publish_slice(Daemon* daemon, int slice, int slices)
         FrameHeader header = header_of(daemon, slot);
         int blocks = publish_block_count(&daemon->publisher, hair);
         for (int b = 0; b < blocks; ++b, ++message)
-            if (message >= first && message < end)
-                publish_block(&daemon->publisher, &header, &slot->planes, hair, b);
+            if (message >= first && message < end &&
+                !publish_block(&daemon->publisher, &header, &slot->planes, hair, b))
+                remark_unsent(daemon, slot);
     }
 }
 
@@ -693,6 +744,11 @@ int daemon_tick_number(const Daemon* daemon)
 double daemon_rate_hz(const Daemon* daemon)
 {
     return daemon->sim.rate_hz;
+}
+
+int64_t daemon_unsent(const Daemon* daemon)
+{
+    return daemon->publisher.unsent;
 }
 
 void daemon_count_overrun(Daemon* daemon, int ticks)

@@ -65,6 +65,9 @@ int64_t daemon_epoch(const Daemon* daemon);
 int daemon_tick_number(const Daemon* daemon);
 double daemon_rate_hz(const Daemon* daemon);
 void daemon_count_overrun(Daemon* daemon, int ticks);
+// Messages that no sink got, because what they should say does not fit the wire (a head 1e9 m away,
+// a clock before 1970). More than none in a recording is a hole in it.
+int64_t daemon_unsent(const Daemon* daemon);
 
 typedef struct DaemonStatus {
     int characters, strands, styles;

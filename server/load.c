@@ -117,10 +117,9 @@ static bool read_files(const Json* json, const char* key, const json_t* value)
 static bool read_name(const Json* json, const char* key, const json_t* value)
 {
     const char* name = json_string_value(value);
-    size_t length = name != NULL ? strlen(name) : 0;
-    if (length < 1 || length >= HAIRSTYLE_NAME_BYTES || strspn(name, " ") == length)
-        return wrong(json, key, "must be a text of 1 to 31 bytes");
-    memcpy(json->recipe->name, name, length + 1);
+    if (name == NULL || !hairstyle_is_name(name))
+        return wrong(json, key, "must be 1 to 31 letters, digits, signs of ASCII");
+    strcpy(json->recipe->name, name);
     return true;
 }
 
@@ -275,6 +274,11 @@ static bool take_files(Recipe* recipe, const LoadOptions* options, Fault* fault)
 {
     for (int i = 0; i < options->style_count; ++i) {
         if (!ends_with(options->styles[i], ".tfx")) {
+            if (ends_with(options->styles[i], ".json"))
+                return fault_set(fault,
+                                 "style %.200s: a .json style stands alone: give it once, without "
+                                 "others",
+                                 options->styles[i]);
             if (options->style_count == 1 || builtin_index(options->styles[i]) < 0)
                 return refuse_style(options->styles[i], fault);
             return fault_set(fault, "style %.60s: a built-in style stands alone, without files",
@@ -603,7 +607,7 @@ static bool build_style(Hairstyle* style, Groom* groom, const Notice* notice, Fa
     style->head_centre = box_middle(&hair);
     if (!bind_groom(style, groom, fault)) return false;
     if (groom->recipe.head[0] != 0 && !load_head(style, groom, notice, fault)) return false;
-    return hairstyle_validate(style, fault);
+    return hairstyle_validate(style, fault) || fault_prefix(fault, groom->recipe.files[0]);
 }
 
 static Hairstyle* make_style(Groom* groom, const Notice* notice, Fault* fault)

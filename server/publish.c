@@ -7,14 +7,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-void publish_bytes(Publisher* publisher, int64_t utime, const char* channel, const uint8_t* bytes,
+bool publish_bytes(Publisher* publisher, int64_t utime, const char* channel, const uint8_t* bytes,
                    size_t size)
 {
-    if (size == 0) return;
+    publisher->unsent += size == 0;
+    if (size == 0) return false;
     for (int i = 0; i < publisher->sink_count; ++i)
         publisher->sinks[i].publish(publisher->sinks[i].context, utime, channel, bytes, size);
     ++publisher->sent_messages;
     publisher->sent_bytes += (int64_t)size;
+    return true;
 }
 
 bool publish_planes_create(PublishPlanes* planes, int guides, int nodes)
@@ -66,7 +68,7 @@ int publish_block_count(const Publisher* publisher, const Hairstyle* style)
     return (style->guide_count + rows - 1) / rows;
 }
 
-void publish_block(Publisher* publisher, const FrameHeader* header, const PublishPlanes* planes,
+bool publish_block(Publisher* publisher, const FrameHeader* header, const PublishPlanes* planes,
                    const Hairstyle* style, int block)
 {
     int rows = frame_rows_per_message(publisher->mtu, style->nodes);
@@ -79,7 +81,7 @@ void publish_block(Publisher* publisher, const FrameHeader* header, const Publis
                                planes->positions, planes->tangents);
     char channel[CHANNEL_BYTES];
     channel_guides(channel, header->slot);
-    publish_bytes(publisher, header->utime, channel, publisher->buffer, size);
+    return publish_bytes(publisher, header->utime, channel, publisher->buffer, size);
 }
 
 void publish_style_restart(PublishStyle* style)

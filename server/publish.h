@@ -16,11 +16,14 @@ typedef struct Publisher {
     int mtu;
     int64_t epoch;
     int64_t sent_messages, sent_bytes;
+    int64_t unsent;   // messages that could not be encoded
     int bulk_sharers; // styles whose bulk lane is due: they share its rate; 0 counts as 1
     uint8_t buffer[FRAME_MAX_BYTES];
 } Publisher;
 
-void publish_bytes(Publisher* publisher, int64_t utime, const char* channel, const uint8_t* bytes,
+// To every sink. A `size` of 0 is what encoders return for what does not fit the wire: false, and
+// counted.
+bool publish_bytes(Publisher* publisher, int64_t utime, const char* channel, const uint8_t* bytes,
                    size_t size);
 
 // One tick of one character as texels.
@@ -39,8 +42,9 @@ int publish_quantise(PublishPlanes* planes, const Sim* sim, const float rotation
                      const Hairstyle* style);
 
 int publish_block_count(const Publisher* publisher, const Hairstyle* style);
-// Block `block` of a character; `header` comes without its rows.
-void publish_block(Publisher* publisher, const FrameHeader* header, const PublishPlanes* planes,
+// Block `block` of a character; `header` comes without its rows. False where it does not fit the
+// wire.
+bool publish_block(Publisher* publisher, const FrameHeader* header, const PublishPlanes* planes,
                    const Hairstyle* style, int block);
 
 // What of a style is still to be sent.

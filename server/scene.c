@@ -3,13 +3,17 @@
 #include "server/motion.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #define MAX_FILE_BYTES (1 << 20)
+#define FARTHEST_M     1e8 // messages take heads within 1e9 m; the rest is for motion
 
 // A value's place in the document, so that a fault can name its line: Jansson forgets lines once
 // the syntax is right.
@@ -109,6 +113,21 @@ static bool fault_at(const Reader* reader, const Place* place, const char* what)
     return fault_set(reader->fault, "%s:%d:%d: %s", reader->path, line, column, what);
 }
 
+// "NAME" WHAT, where NAME is the key, or of an element of a list its number in the list's key.
+static bool fault_named(const Reader* reader, const Place* place, const char* what)
+{
+    char text[200];
+    if (place == NULL)
+        snprintf(text, sizeof text, "the scene %s", what);
+    else if (place->key != NULL)
+        snprintf(text, sizeof text, "\"%.60s\" %s", place->key, what);
+    else
+        snprintf(text, sizeof text, "\"%.60s\"[%zu] %s",
+                 place->parent != NULL && place->parent->key != NULL ? place->parent->key : "",
+                 place->index, what);
+    return fault_at(reader, place, text);
+}
+
 // One member that an object may have.
 typedef struct Member Member;
 struct Member {
@@ -123,7 +142,7 @@ struct Member {
 static bool read_object(const Reader* reader, const Place* place, const json_t* object,
                         const Member* members, void* to)
 {
-    if (!json_is_object(object)) return fault_at(reader, place, "must be an object { ... }");
+    if (!json_is_object(object)) return fault_named(reader, place, "must be an object { ... }");
     char text[200];
     const char* key;
     json_t* value;
@@ -214,8 +233,8 @@ READER(read_motion)
 READER(read_name)
 {
     const char* name = json_string_value(value);
-    if (name == NULL || *name == '\0' || strlen(name) >= HAIRSTYLE_NAME_BYTES)
-        return fault_at(reader, place, "\"name\" must be a text of 1 to 31 bytes");
+    if (name == NULL || !hairstyle_is_name(name))
+        return fault_at(reader, place, "\"name\" must be 1 to 31 letters, digits, signs of ASCII");
     strcpy(((SceneStyle*)to)->name, name);
     (void)member;
     return true;
@@ -247,7 +266,7 @@ static bool add_source(const Reader* reader, const Place* place, const json_t* v
                        SceneStyle* style, bool is_path)
 {
     const char* text = json_string_value(value);
-    if (text == NULL) return fault_at(reader, place, "must be a text");
+    if (text == NULL) return fault_named(reader, place, "must be a text");
     if (style->load.style_count == LOAD_MAX_FILES)
         return fault_at(reader, place, "too many files for one style (16 at most)");
     const char* kept =
@@ -330,7 +349,7 @@ static const Member character_members[] = {
     {"slot", read_int, CHARACTER_AT(slot), 0, CHANNEL_MAX_SLOTS - 1, true},
     {"style", read_style_of, 0, 0, 0, false},
     {"motion", read_motion, CHARACTER_AT(motion), 0, 0, false},
-    {"position", read_position, CHARACTER_AT(position), -1e9, 1e9, false},
+    {"position", read_position, CHARACTER_AT(position), -FARTHEST_M, FARTHEST_M, false},
     {0},
 };
 
@@ -376,7 +395,8 @@ static bool read_list(const Reader* reader, const json_t* root, const char* key,
 {
     const json_t* list = json_object_get(root, key);
     Place here = {NULL, key, 0};
-    if (list != NULL && !json_is_array(list)) return fault_at(reader, &here, "must be a list");
+    if (list != NULL && !json_is_array(list))
+        return fault_named(reader, &here, "must be a list [ ... ]");
     for (size_t i = 0; i < json_array_size(list); ++i)
         if (!read(reader, &(Place){&here, NULL, i}, json_array_get(list, i), scene)) return false;
     return true;
@@ -411,23 +431,41 @@ static bool read_scene(const Reader* reader, const json_t* root, SimDefinition* 
            read_list(reader, root, "characters", scene, read_character);
 }
 
-static char* read_file(const char* path, Fault* fault)
+// Without waiting for a pipe, and without reading a folder as an empty text.
+static FILE* open_file(const char* path, Fault* fault)
 {
-    FILE* file = fopen(path, "rb");
-    if (file == NULL) {
+    struct stat status;
+    int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (file < 0) {
         fault_set(fault, "%s: cannot open this scene file: %s", path, strerror(errno));
         return NULL;
     }
+    bool is_file = fstat(file, &status) == 0 && S_ISREG(status.st_mode);
+    FILE* stream = is_file ? fdopen(file, "rb") : NULL;
+    if (stream != NULL) return stream;
+    close(file);
+    fault_set(fault, "%s: %s", path, is_file ? "no memory" : "not a file; a scene must be one");
+    return NULL;
+}
+
+static char* read_file(const char* path, Fault* fault)
+{
+    FILE* file = open_file(path, fault);
+    if (file == NULL) return NULL;
     char* text = malloc(MAX_FILE_BYTES + 1);
     size_t size = text != NULL ? fread(text, 1, MAX_FILE_BYTES + 1, file) : 0;
+    int error = ferror(file) ? errno : 0;
     fclose(file);
-    if (text == NULL || size > MAX_FILE_BYTES || memchr(text, '\0', size) != NULL) {
-        fault_set(fault, "%s: not a scene: larger than 1 MiB or not text", path);
-        free(text);
-        return NULL;
+    if (error == 0 && text != NULL && size <= MAX_FILE_BYTES && memchr(text, '\0', size) == NULL) {
+        text[size] = '\0';
+        return text;
     }
-    text[size] = '\0';
-    return text;
+    if (error != 0)
+        fault_set(fault, "%s: cannot read this scene file: %s", path, strerror(error));
+    else
+        fault_set(fault, "%s: not a scene: larger than 1 MiB or not text", path);
+    free(text);
+    return NULL;
 }
 
 Scene* scene_load(const char* path, SimDefinition* sim, Fault* fault)

@@ -287,6 +287,9 @@ static void check_together(const Options* options, struct argp_state* state)
         argp_error(state, "--scene: what grooms are made of stands in the scene's styles");
     if (options->daemon.scene != NULL && options->info)
         argp_error(state, "--info is of a --style, not of a --scene");
+    if (options->info && (options->record != NULL || options->ticks > 0 || options->hash))
+        argp_error(state, "--info prints the style and exits: leave --record, --ticks and --hash "
+                          "out");
     if (options->overwrite && options->record == NULL)
         argp_error(state, "--overwrite needs --record FILE");
     if (options->hash && options->ticks == 0)
@@ -301,6 +304,9 @@ static error_t parse(int key, char* text, struct argp_state* state)
     if (key == ARGP_KEY_ARG)
         argp_error(state, "\"%s\" is not an option; did you mean --style %s?", text, text);
     if (options->scene_only) {
+        if (key == KEY_SCENE && options->daemon.scene != NULL)
+            argp_error(state, "--scene %s: a second one, after %s; put all into one scene", text,
+                       options->daemon.scene);
         if (key == KEY_SCENE) options->daemon.scene = text;
         return 0;
     }
@@ -331,6 +337,7 @@ typedef struct Server {
     Daemon* daemon;
     Link* link;
     LogWriter* log;
+    int64_t done;           // ticks
     bool failed;            // a fault was said
     bool has_progress;      // a line without its end stands on the terminal
     int64_t dropped_before; // a second ago
@@ -349,10 +356,15 @@ static void request_stop(int signal)
 
 static void catch_signals(void)
 {
-    struct sigaction action = {.sa_handler = request_stop, .sa_flags = SA_RESETHAND};
+    struct sigaction action = {.sa_handler = request_stop, .sa_flags = SA_RESETHAND}, before;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    // A closed terminal sends it twice, by the kernel and by the shell; under nohup it is ignored.
+    action.sa_flags = 0;
+    sigaction(SIGHUP, NULL, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // writing fails with EFBIG instead, and that is said
 }
 
 static void say_error(Server* server, const char* text)
@@ -404,16 +416,17 @@ static bool open_bus(Server* server, Fault* fault)
     return true;
 }
 
+// The log last: a start that fails leaves the files as they were.
 static bool open_outputs(Server* server, Fault* fault)
 {
     const Options* options = server->options;
-    if (options->record != NULL) {
-        server->log = log_create(options->record, options->overwrite, fault);
-        if (server->log == NULL) return false;
-        daemon_add_sink(server->daemon, (DaemonSink){write_to_log, server});
-    }
     bool is_offline = options->daemon.fast && (options->record != NULL || options->hash);
-    return (is_offline && options->url == NULL) || open_bus(server, fault);
+    if (!(is_offline && options->url == NULL) && !open_bus(server, fault)) return false;
+    if (options->record == NULL) return true;
+    server->log = log_create(options->record, options->overwrite, fault);
+    if (server->log == NULL) return false;
+    daemon_add_sink(server->daemon, (DaemonSink){write_to_log, server});
+    return true;
 }
 
 static void say_ready(const Server* server)
@@ -462,22 +475,35 @@ static void listen_until(Server* server, int64_t when_us)
     }
 }
 
-static bool goes_on(const Server* server, int64_t done)
+// The daemon has said which character or message it is.
+static void check_recorded(Server* server)
+{
+    int64_t unsent = daemon_unsent(server->daemon);
+    if (server->log == NULL || unsent == 0 || server->failed) return;
+    char text[sizeof((Fault*)0)->text];
+    snprintf(text, sizeof text, "%.200s: incomplete: %" PRId64 " messages do not fit the wire",
+             server->options->record, unsent);
+    say_error(server, text);
+    server->failed = true;
+}
+
+static bool goes_on(Server* server)
 {
     int64_t ticks = server->options->ticks;
-    return !stop_requested && !server->failed && (ticks == 0 || done < ticks);
+    check_recorded(server);
+    return !stop_requested && !server->failed && (ticks == 0 || server->done < ticks);
 }
 
 static void run_fast(Server* server)
 {
     int64_t tick_us = (int64_t)(1e6 / daemon_rate_hz(server->daemon));
-    for (int64_t done = 0; goes_on(server, done); ++done) {
+    for (; goes_on(server); ++server->done) {
         if (server->link != NULL) listen_until(server, 0);
         daemon_tick(server->daemon);
-        if (done == 0) daemon_publish_styles(server->daemon);
+        if (server->done == 0) daemon_publish_styles(server->daemon);
         daemon_publish_slice(server->daemon, 0, 1);
         daemon_publish_background(server->daemon, tick_us);
-        if (done % 600 == 599) say_progress(server);
+        if (server->done % 600 == 599) say_progress(server);
     }
 }
 
@@ -515,9 +541,9 @@ static void run_paced(Server* server)
 {
     double exact_us = 1e6 / daemon_rate_hz(server->daemon);
     double due_us = (double)base_monotonic_us(), said_us = due_us;
-    for (int64_t done = 0; goes_on(server, done); ++done) {
+    for (; goes_on(server); ++server->done) {
         daemon_tick(server->daemon);
-        if (done == 0 && server->log != NULL)
+        if (server->done == 0 && server->log != NULL)
             daemon_record_styles(server->daemon, (DaemonSink){write_to_log, server});
         for (int slice = 0; slice < SLICES && !stop_requested; ++slice) {
             listen_until(server, (int64_t)(due_us + exact_us * slice / SLICES));
@@ -555,6 +581,16 @@ static void finish(Server* server)
     }
 }
 
+static bool print_hash(Server* server, Fault* fault)
+{
+    int64_t ticks = server->options->ticks;
+    if (server->done < ticks)
+        return fault_set(fault, "stopped after %" PRId64 " of %" PRId64 " ticks: no hash",
+                         server->done, ticks);
+    printf("hash %016" PRIx64 "\n", daemon_state_hash(server->daemon));
+    return true;
+}
+
 static int serve(Options* options)
 {
     Server server = {.options = options};
@@ -576,8 +612,8 @@ static int serve(Options* options)
         server.failed = true;
     }
     finish(&server);
-    if (options->hash && !server.failed)
-        printf("hash %016" PRIx64 "\n", daemon_state_hash(server.daemon));
+    if (options->hash && !server.failed && !print_hash(&server, &options->fault))
+        server.failed = true;
     daemon_destroy(server.daemon);
     return server.failed ? EXIT_FAILURE : EXIT_SUCCESS;
 }
@@ -587,6 +623,11 @@ int main(int argc, char** argv)
     static Options options;
     catch_signals();
     int status = read_options(&options, argc, argv) ? serve(&options) : EXIT_FAILURE;
+    Fault unwritten;
+    if (status == EXIT_SUCCESS && !base_stdout_written(&unwritten)) {
+        say_error(NULL, unwritten.text);
+        status = EXIT_FAILURE;
+    }
     if (options.fault.text[0] != '\0') say_error(NULL, options.fault.text);
     return status;
 }

@@ -4,7 +4,9 @@
 #include "messages/frame.h"
 #include "messages/style.h"
 #include "server/daemon.h"
+#include "server/groom.h"
 #include "server/inputs.h"
+#include "server/publish.h"
 #include "tests/allocations.h"
 
 #include <math.h>
@@ -477,6 +479,67 @@ static void adding_another_style_changes_it(void** state)
     daemon_destroy(daemon);
 }
 
+// A sender's add may be a second later than its poses: LCM keeps nothing for who starts late.
+static void poses_may_come_a_second_before_their_character(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "bus");
+    options.characters = 0;
+    Daemon* daemon = create(&options, &heard);
+    for (int n = 0; n < 70; ++n) {
+        send_pose_of(daemon, n / 60.0, 0.0, 0.0, 0, POSE_FOLLOW);
+        tick(daemon, &heard);
+    }
+    assert_int_equal(heard.notices, 0);
+    assert_int_equal(daemon_status(daemon).rejected, 70);
+    send_character(daemon, 0, CHARACTER_ADD, "");
+    send_pose_of(daemon, 2.0, 0.0, 0.0, 0, POSE_FOLLOW);
+    tick(daemon, &heard);
+    assert_int_equal(heard.notices, 0);
+    assert_int_equal(daemon_status(daemon).rejected, 70);
+    send_character(daemon, 0, CHARACTER_REMOVE, "");
+    for (int n = 0; n < 100; ++n) {
+        send_pose_of(daemon, 3.0 + n / 60.0, 0.0, 0.0, 0, POSE_FOLLOW);
+        tick(daemon, &heard);
+    }
+    assert_int_equal(heard.notices, 1); // nobody adds it
+    assert_non_null(strstr(heard.notice, "without a character"));
+    daemon_destroy(daemon);
+}
+
+static void what_does_not_fit_the_wire_is_counted_and_not_sent(void** state)
+{
+    (void)state;
+    static Publisher publisher;
+    static uint16_t positions[MAX_ROWS * HAIRSTYLE_MAX_NODES * 3];
+    static int16_t tangents[MAX_ROWS * HAIRSTYLE_MAX_NODES * 3];
+    PublishPlanes planes = {.positions = positions, .tangents = tangents};
+    Hairstyle* style = groom_long(NULL);
+    memset(&heard, 0, sizeof heard);
+    publisher = (Publisher){.sinks = {{hear, &heard}}, .sink_count = 1, .mtu = 1500};
+    FrameHeader header = {.epoch = 1, .pose = pose_identity()};
+    assert_true(publish_block(&publisher, &header, &planes, style, 0));
+    assert_int_equal(publisher.unsent, 0);
+    header.pose.position.y = -1e9;
+    assert_false(publish_block(&publisher, &header, &planes, style, 0));
+    header.pose.position.y = NAN;
+    assert_false(publish_block(&publisher, &header, &planes, style, 1));
+    assert_int_equal(publisher.unsent, 2);
+    assert_int_equal(publisher.sent_messages, 1);
+    hairstyle_destroy(style);
+}
+
+static void a_simulation_that_no_character_could_have_is_refused_without_one(void** state)
+{
+    (void)state;
+    Fault fault = {0};
+    DaemonOptions options = options_for(&heard, "none");
+    options.characters = 0;
+    options.sim.stiffness_s2 = 1e6f;
+    assert_null(daemon_create(&options, &fault));
+    assert_non_null(strstr(fault.text, "stiffness_s2"));
+}
+
 static void an_unknown_style_is_told_the_known_ones(void** state)
 {
     (void)state;
@@ -615,6 +678,12 @@ static void a_wrong_scene_names_line_and_column(void** state)
         {"{\"characters\": [{\"slot\": 0},\n {\"slot\": 0}]}", ":2:2: this slot"},
         {"{\"characters\": [{\"slot\": 0,\n\"position\": [1, 2, \"x\"]}]}", ":2:20:"},
         {"{\"characters\": [{\"slot\": 0, \"motion\": \"hop\"}]}", ":1:29:"},
+        {"{\"characters\": [{\"slot\": 0,\n\"position\": [1, 2, 1e9]}]}", "-1e+08 to 1e+08"},
+        {"{\"styles\": [{\"name\": \"\xc3\xa9\", \"builtin\": \"bob\"}]}", ":1:14: \"name\""},
+        {"{\"styles\": [{\"name\": \"a\", \"files\": [3]}]}", "\"files\"[0] must be a text"},
+        {"{\"styles\": {}}", "\"styles\" must be a list"},
+        {"{\"styles\": [\"bob\"]}", "\"styles\"[0] must be an object"},
+        {"{\"simulation\": 3}", "\"simulation\" must be an object"},
         {"{\"characters\": 3}", ":1:2:"},
         {"{\"substeps\": 2.5}", ":1:2:"},
         {"[]", ":1:1:"},
@@ -647,6 +716,9 @@ int main(void)
         cmocka_unit_test(characters_come_and_go),
         cmocka_unit_test(adding_what_is_worn_changes_nothing),
         cmocka_unit_test(adding_another_style_changes_it),
+        cmocka_unit_test(poses_may_come_a_second_before_their_character),
+        cmocka_unit_test(what_does_not_fit_the_wire_is_counted_and_not_sent),
+        cmocka_unit_test(a_simulation_that_no_character_could_have_is_refused_without_one),
         cmocka_unit_test(an_unknown_style_is_told_the_known_ones),
         cmocka_unit_test(bad_bytes_are_counted_and_noticed_once_a_kind),
         cmocka_unit_test(a_new_daemon_outbids_a_higher_epoch_once),

@@ -254,6 +254,8 @@ static void style_file_faults_name_file_and_key(void** state)
         {"{\"files\": [\"a4.tfx\"], \"both_ends\": true}", "\"both_ends\""},
         {"{\"files\": [\"a4.tfx\"], \"both_ends\": \"beard\"}", "beard"},
         {"{\"files\": [\"a4.tfx\"], \"name\": \"\"}", "\"name\""},
+        {"{\"files\": [\"a4.tfx\"], \"name\": \"\xc3\xa9\"}", "\"name\""},
+        {"{\"files\": [\"a4.tfx\"], \"unit_m\": 900}", "a4.tfx: head centre is "},
         {"{\"files\": [\"a4.tfx\"], \"material\": {\"colour\": 1}}", "\"colour\": unknown"},
         {"{\"files\": [\"a4.tfx\"], \"material\": {\"tip_colour\": [1, 2, 0]}}", "\"tip_colour\""},
         {"{\"files\": [\"a4.tfx\"], \"material\": {\"tip_colour\": [1, 0]}}", "\"tip_colour\""},
@@ -283,6 +285,9 @@ static void unknown_styles_are_told_what_there_is(void** state)
     options = (LoadOptions){.styles = {"a.tfx", "long"}, .style_count = 2};
     assert_null(load_style(&options, NULL, &fault));
     assert_non_null(strstr(fault.text, "stands alone"));
+    options = (LoadOptions){.styles = {"a.json", "a.json"}, .style_count = 2};
+    assert_null(load_style(&options, NULL, &fault));
+    assert_non_null(strstr(fault.text, "a.json: a .json style stands alone"));
     options.style_count = 0;
     assert_null(load_style(&options, NULL, &fault));
 }

@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define EVENTS 12
@@ -358,6 +359,96 @@ static void log_create_keeps_an_existing_file_and_faults_name_the_path(void** st
     assert_non_null(strstr(fault.text, "/nowhere"));
 }
 
+static int64_t bytes_of(const char* path)
+{
+    struct stat status;
+    return stat(path, &status) == 0 ? (int64_t)status.st_size : -1;
+}
+
+static void log_create_loses_nothing_before_the_first_event(void** state)
+{
+    (void)state;
+    char path[64];
+    make_path(path);
+    write_small(path);
+    int64_t before = bytes_of(path);
+    LogWriter* writer = log_create(path, true, NULL);
+    assert_non_null(writer);
+    assert_true(log_finish(writer, NULL));
+    assert_int_equal(bytes_of(path), before);
+    writer = log_create(path, true, NULL);
+    assert_true(log_write(writer, 1, "A", (const uint8_t*)"x", 1, NULL));
+    assert_true(log_finish(writer, NULL));
+    assert_int_equal(bytes_of(path), 28 + 1 + 1); // nothing of the earlier one is left behind it
+    unlink(path);
+    for (int overwrite = 0; overwrite < 2; ++overwrite) {
+        writer = log_create(path, overwrite == 1, NULL);
+        assert_non_null(writer);
+        assert_true(log_finish(writer, NULL));
+        assert_int_equal(bytes_of(path), -1); // made here, never written
+    }
+}
+
+static void log_create_refuses_a_file_that_is_being_recorded(void** state)
+{
+    (void)state;
+    char path[64];
+    Fault fault = {0};
+    make_path(path);
+    LogWriter* first = log_create(path, true, NULL);
+    assert_true(log_write(first, 1, "A", (const uint8_t*)"x", 1, NULL));
+    assert_null(log_create(path, true, &fault));
+    assert_non_null(strstr(fault.text, path));
+    assert_non_null(strstr(fault.text, "another program"));
+    assert_true(log_finish(first, NULL));
+    assert_int_equal(bytes_of(path), 30);
+    LogWriter* second = log_create(path, true, &fault);
+    assert_non_null(second);
+    log_finish(second, NULL);
+    unlink(path);
+}
+
+static void log_create_refuses_pipes_at_once(void** state)
+{
+    (void)state;
+    char path[64];
+    Fault fault = {0};
+    make_path(path);
+    unlink(path);
+    assert_int_equal(mkfifo(path, 0600), 0);
+    assert_null(log_create(path, true, &fault));
+    assert_non_null(strstr(fault.text, "not a file"));
+    int reader = open(path, O_RDONLY | O_NONBLOCK); // now it could be opened
+    assert_null(log_create(path, true, &fault));
+    assert_non_null(strstr(fault.text, "not a file"));
+    close(reader);
+    unlink(path);
+}
+
+// What is gone from the file can only come from the window.
+static void log_seek_reads_nothing_again_that_it_still_holds(void** state)
+{
+    (void)state;
+    char path[64];
+    int64_t offset[EVENTS];
+    LogEvent event;
+    make_path(path);
+    write_small(path);
+    LogReader* reader = log_open(path, NULL);
+    for (int i = 0; i < EVENTS; ++i) {
+        assert_true(log_next(reader, &event));
+        offset[i] = event.offset;
+    }
+    assert_int_equal(truncate(path, 0), 0);
+    for (int i = EVENTS - 1; i >= 0; --i) {
+        log_seek(reader, offset[i]);
+        assert_true(log_next(reader, &event));
+        assert_true(is_event(&event, i));
+    }
+    log_close(reader);
+    unlink(path);
+}
+
 // Writes until something gives; returns how many faults were reported.
 static int write_much(LogWriter* writer, Fault* fault)
 {
@@ -430,6 +521,10 @@ int main(void)
         cmocka_unit_test(log_carries_the_largest_event_and_refuses_a_larger_one),
         cmocka_unit_test(log_skips_an_event_beyond_the_cap),
         cmocka_unit_test(log_create_keeps_an_existing_file_and_faults_name_the_path),
+        cmocka_unit_test(log_create_loses_nothing_before_the_first_event),
+        cmocka_unit_test(log_create_refuses_a_file_that_is_being_recorded),
+        cmocka_unit_test(log_create_refuses_pipes_at_once),
+        cmocka_unit_test(log_seek_reads_nothing_again_that_it_still_holds),
         cmocka_unit_test(log_write_reports_a_full_disk_once),
         cmocka_unit_test(log_cut_short_by_a_full_disk_ends_with_a_whole_event),
     };

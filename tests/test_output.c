@@ -162,6 +162,53 @@ static void nothing_is_kept_without_a_path(void** state)
     must_close(NULL);
 }
 
+static void keep_notice(void* context, const char* text)
+{
+    snprintf(context, 400, "%s", text);
+}
+
+static void pictures_of_a_longer_earlier_run_are_told(void** state)
+{
+    (void)state;
+    char said[400] = "";
+    Notice notice = {keep_notice, said};
+    for (int pictures = 3; pictures >= 2; --pictures) {
+        Output* output = must_open(path_in("again"));
+        for (int i = 0; i < pictures; ++i)
+            put(output, (uint8_t)(10 * pictures + i));
+        output_tell_older(output, &notice);
+        must_close(output);
+        if (pictures == 3) assert_string_equal(said, "");
+    }
+    assert_non_null(strstr(said, "again/00002.png"));
+    assert_picture("again/00001.png", 21);
+    assert_picture("again/00002.png", 32); // told, not removed
+}
+
+static void what_is_abandoned_leaves_the_earlier_file(void** state)
+{
+    (void)state;
+    static const char* const names[] = {"kept.png", "kept.mp4"};
+    bool has_ffmpeg = system("ffmpeg -version > /dev/null 2>&1") == 0;
+    for (size_t i = 0; i < (has_ffmpeg ? 2 : 1); ++i) {
+        int before = files_in(folder);
+        FILE* file = fopen(path_in(names[i]), "w");
+        assert_non_null(file);
+        assert_int_equal(fputs("kept", file) < 0, 0);
+        fclose(file);
+        Output* output = must_open(path_in(names[i]));
+        put(output, 1);
+        output_abandon(output);
+        char text[8] = "";
+        file = fopen(path_in(names[i]), "r");
+        assert_non_null(fgets(text, sizeof text, file));
+        fclose(file);
+        assert_string_equal(text, "kept");
+        assert_int_equal(files_in(folder), before + 1);
+    }
+    output_abandon(NULL);
+}
+
 // Refused at once, in one line that names the option and holds `words`.
 static void expect_refused(const char* path, const char* words)
 {
@@ -183,6 +230,27 @@ static void places_that_do_not_exist_are_refused_at_once(void** state)
     expect_refused(path_in("nowhere/a.mp4"), "nowhere: No such file or directory");
     expect_refused(path_in("nowhere/a"), "No such file or directory");
     expect_refused("", "");
+}
+
+static void endings_are_read_in_any_case_and_unknown_ones_are_refused(void** state)
+{
+    (void)state;
+    Output* output = must_open(path_in("loud.PNG"));
+    put(output, 7);
+    must_close(output);
+    assert_picture("loud.PNG", 7);
+    static const char* const unknown[] = {"a.tiff", "a.jpg", ".png", "sub/.mp4", ".hidden"};
+    for (size_t i = 0; i < sizeof unknown / sizeof *unknown; ++i) {
+        expect_refused(path_in(unknown[i]), "ends with /");
+        assert_int_not_equal(access(path_in(unknown[i]), F_OK), 0);
+    }
+    expect_refused("-", "choose");
+    // Meant as a directory: there already, or said so.
+    output = must_open(path_in("run.1/"));
+    put(output, 8);
+    must_close(output);
+    must_close(must_open(path_in("run.1")));
+    assert_picture("run.1/00000.png", 8);
 }
 
 static void files_in_the_place_of_directories_are_refused_at_once(void** state)
@@ -256,6 +324,9 @@ int main(void)
         cmocka_unit_test(png_of_no_picture_is_not_written),
         cmocka_unit_test(directory_is_made_and_its_files_are_numbered),
         cmocka_unit_test(mp4_is_a_film),
+        cmocka_unit_test(pictures_of_a_longer_earlier_run_are_told),
+        cmocka_unit_test(what_is_abandoned_leaves_the_earlier_file),
+        cmocka_unit_test(endings_are_read_in_any_case_and_unknown_ones_are_refused),
         cmocka_unit_test(nothing_is_kept_without_a_path),
         cmocka_unit_test(places_that_do_not_exist_are_refused_at_once),
         cmocka_unit_test(files_in_the_place_of_directories_are_refused_at_once),

@@ -188,6 +188,24 @@ static void playback_names_the_rows_that_are_missing(void** state)
     stage_close(stage);
 }
 
+// A sound block of the right tick may still contradict the style: its rows are not there.
+static void playback_counts_no_rows_that_were_refused(void** state)
+{
+    (void)state;
+    Stage* stage = stage_open(0);
+    record_lane(stage, STYLE_FAST, 0, INBOUND_MTU);
+    for (int i = 0; i < inbound_blocks(); ++i) {
+        FrameHeader header = inbound_header(SLOT, 12, stage->style.hash);
+        if (i == 1) header.nodes = INBOUND_NODES - 1;
+        record_block(stage, header, i);
+    }
+    assert_true(stage_play(stage, SLOT, 0));
+    assert_true(playback_feed_styles(stage->playback, stage->receive, &stage->fault));
+    assert_false(feed(stage, 12));
+    assert_non_null(strstr(stage->fault.text, "strands 14-27 are missing"));
+    stage_close(stage);
+}
+
 static void playback_names_a_style_that_is_missing_or_incomplete(void** state)
 {
     (void)state;
@@ -315,6 +333,32 @@ static void hair_log_info_tells_what_a_log_holds(void** state)
     stage_close(stage);
 }
 
+static void hair_log_info_counts_ticks_that_lack_rows(void** state)
+{
+    (void)state;
+    if (access(BIN_DIR "/hair-log", X_OK) != 0) {
+        print_message("skipped: %s/hair-log is not built\n", BIN_DIR);
+        skip();
+    }
+    for (int has_style = 0; has_style < 2; ++has_style) {
+        Stage* stage = stage_open(0);
+        if (has_style == 1) record_lane(stage, STYLE_FAST, 0, INBOUND_MTU);
+        for (int tick = TICKS - 1; tick >= 0; --tick) // backwards, and two blocks of each swapped
+            for (int i = inbound_blocks() - 1; i >= 0; --i) {
+                bool lost = tick == 5 || (tick == 3 && i == 0) || (tick == 9 && i == 1);
+                if (lost || (tick == 11 && i == inbound_blocks() - 1)) continue;
+                record_block(stage, inbound_header(SLOT, tick, stage->style.hash), i);
+            }
+        assert_true(log_finish(stage->writer, &stage->fault));
+        char arguments[160], output[4096];
+        snprintf(arguments, sizeof arguments, "info %s", stage->path);
+        assert_int_equal(run_info(arguments, output, sizeof output), 0);
+        if (strstr(output, "slot 7: ticks 0..39, 1 missing, 3 incomplete, ") == NULL)
+            fail_msg("%s", output);
+        stage_close(stage);
+    }
+}
+
 // v1.lcmlog holds a grown and an imported style and three ticks of each. It is never recorded anew:
 // a build that cannot play it has broken a published type.
 static void a_log_of_version_1_always_plays(void** state)
@@ -349,12 +393,14 @@ int main(void)
         cmocka_unit_test(playback_goes_to_any_tick_in_any_order),
         cmocka_unit_test(playback_names_a_tick_that_is_missing),
         cmocka_unit_test(playback_names_the_rows_that_are_missing),
+        cmocka_unit_test(playback_counts_no_rows_that_were_refused),
         cmocka_unit_test(playback_names_a_style_that_is_missing_or_incomplete),
         cmocka_unit_test(playback_lists_epochs_where_there_are_several),
         cmocka_unit_test(playback_lists_slots_where_the_one_is_not_there),
         cmocka_unit_test(playback_survives_a_log_damaged_anywhere),
         cmocka_unit_test(a_log_of_version_1_always_plays),
         cmocka_unit_test(hair_log_info_tells_what_a_log_holds),
+        cmocka_unit_test(hair_log_info_counts_ticks_that_lack_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

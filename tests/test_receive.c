@@ -181,6 +181,53 @@ static void receive_counts_every_dropped_message_of_closed_ticks(void** state)
     stage_close(stage);
 }
 
+static void receive_counts_no_more_than_600_ticks_of_a_gap(void** state)
+{
+    (void)state;
+    Stage* stage = stage_open(0);
+    send_tick(stage, at_tick(stage, 0));
+    send_tick(stage, at_tick(stage, 1));
+    send_tick(stage, at_tick(stage, INT32_MAX - 1)); // anybody can say so
+    assert_int_equal(counters(stage).lost, 600 * inbound_blocks());
+    stage_close(stage);
+}
+
+// A stranger's part fixes the split; the message tells both apart where only the split differs.
+static void receive_tells_how_a_part_is_split_otherwise(void** state)
+{
+    (void)state;
+    Stage* stage = stage_open(0);
+    send_tick(stage, at_tick(stage, 1));
+    send(stage, CHANNEL_STYLE, inbound_part(&stage->style, STYLE_FAST, 0, 800));
+    send(stage, CHANNEL_STYLE, inbound_part(&stage->style, STYLE_FAST, 1, INBOUND_MTU));
+    assert_int_equal(stage->said, 1);
+    char expected[80];
+    snprintf(expected, sizeof expected, "parts of %d bytes", style_part_bytes(800));
+    assert_non_null(strstr(stage->last, expected));
+    assert_int_equal(counters(stage).rejected, 1);
+    stage_close(stage);
+}
+
+static void receive_tells_how_far_a_style_is(void** state)
+{
+    (void)state;
+    int held, parts, before = 0;
+    Stage* stage = stage_open(600);
+    uint64_t hash = stage->style.hash;
+    send_tick(stage, at_tick(stage, 1));
+    assert_int_equal(receive_style_progress(stage->receive, hash, &held, &parts), 0);
+    assert_int_equal(held + parts, 0);
+    for (int lane = 0; lane < STYLE_LANES; ++lane)
+        for (int i = 0; i < inbound_parts(&stage->style, lane, INBOUND_MTU); ++i) {
+            send(stage, CHANNEL_STYLE, inbound_part(&stage->style, lane, i, INBOUND_MTU));
+            int progress = receive_style_progress(stage->receive, hash, &held, &parts);
+            assert_true(progress > before); // from lane to lane as well
+            before = progress;
+        }
+    assert_non_null(receive_style(stage->receive, hash, NULL, NULL));
+    stage_close(stage);
+}
+
 static void receive_does_not_take_a_late_join_or_a_swap_for_loss(void** state)
 {
     (void)state;
@@ -730,6 +777,9 @@ int main(void)
         cmocka_unit_test(receive_keeps_the_newest_two_ticks_bit_for_bit),
         cmocka_unit_test(receive_take_copies_only_new_rows),
         cmocka_unit_test(receive_counts_every_dropped_message_of_closed_ticks),
+        cmocka_unit_test(receive_counts_no_more_than_600_ticks_of_a_gap),
+        cmocka_unit_test(receive_tells_how_a_part_is_split_otherwise),
+        cmocka_unit_test(receive_tells_how_far_a_style_is),
         cmocka_unit_test(receive_does_not_take_a_late_join_or_a_swap_for_loss),
         cmocka_unit_test(receive_counts_late_and_duplicate_blocks_and_shows_neither),
         cmocka_unit_test(receive_ignores_other_slots_and_channels),

@@ -111,6 +111,7 @@ static void style_part_decode_rejects_every_wrong_field(void** state)
         Fault fault = {0};
         if (style_part_decode(&part, bytes, size, &fault)) fail_msg("wrong field %zu passed", i);
         assert_true(fault.text[0] != '\0');
+        if (wrong[i].at == 46) assert_non_null(strstr(fault.text, "reserved field is 1"));
     }
     // The only part of a lane cannot begin inside it.
     StylePart lone = {.lane_bytes = 100, .parts = 1, .size = 100, .payload = payload};

@@ -39,18 +39,58 @@ static hair_pose_t head_at(int slot, double seconds, int teleported)
     return pose;
 }
 
+static long whole(const char* option, const char* text, long most)
+{
+    char* end;
+    long number = strtol(text, &end, 10); // out of range: the largest or least, which is too
+    if (end != text && *end == '\0' && number >= 0 && number <= most) return number;
+    fprintf(stderr, "pose-publisher: %s %s: want a whole number from 0 to %ld\n", option, text,
+            most);
+    exit(2);
+}
+
+static void set_style(hair_character_t* character, const char* name)
+{
+    if (strlen(name) < sizeof character->style) { // with its NUL
+        strcpy((char*)character->style, name);
+        return;
+    }
+    fprintf(stderr, "pose-publisher: --style %s: want at most 31 bytes\n", name);
+    exit(2);
+}
+
+static void read_options(int argc, char** argv, hair_character_t* character, long* seconds)
+{
+    static const char use[] = "use: pose-publisher [--slot N] [--style NAME] [--seconds S]\n";
+    static const struct option options[] = {{"slot", 1, 0, 's'},
+                                            {"style", 1, 0, 'y'},
+                                            {"seconds", 1, 0, 't'},
+                                            {"help", 0, 0, 'h'},
+                                            {0}};
+    for (int key; (key = getopt_long(argc, argv, "", options, NULL)) != -1;) {
+        if (key == 's') character->slot = (int16_t)whole("--slot", optarg, 1023);
+        if (key == 't') *seconds = whole("--seconds", optarg, 86400);
+        if (key == 'y') set_style(character, optarg);
+        if (key == 'h') exit(fputs(use, stdout) < 0 || fflush(stdout) != 0);
+        if (key == '?') exit(2); // getopt has said why
+    }
+    if (optind == argc) return;
+    fprintf(stderr, "pose-publisher: \"%s\" is not an option\n", argv[optind]);
+    exit(2);
+}
+
+static void publish(lcm_t* lcm, const char* channel, const uint8_t* bytes, int size)
+{
+    if (size > 0 && lcm_publish(lcm, channel, bytes, (unsigned)size) == 0) return;
+    fprintf(stderr, "pose-publisher: the bus does not take %s; is the network up?\n", channel);
+    exit(1);
+}
+
 int main(int argc, char** argv)
 {
-    static const struct option options[] = {
-        {"slot", 1, 0, 's'}, {"style", 1, 0, 'y'}, {"seconds", 1, 0, 't'}, {0}};
     hair_character_t character = {.verb = CHARACTER_ADD};
-    double seconds = 10.0;
-    for (int key; (key = getopt_long(argc, argv, "", options, NULL)) != -1;) {
-        if (key == 's') character.slot = (int16_t)atoi(optarg);
-        if (key == 'y') strncpy((char*)character.style, optarg, sizeof character.style - 1);
-        if (key == 't') seconds = atof(optarg);
-        if (key == '?') return fputs("use: [--slot N] [--style NAME] [--seconds S]\n", stderr), 2;
-    }
+    long seconds = 10;
+    read_options(argc, argv, &character, &seconds);
     lcm_t* lcm = lcm_create(NULL); // $LCM_DEFAULT_URL, else this host
     if (lcm == NULL) return 1;     // liblcm has said why
 
@@ -59,12 +99,11 @@ int main(int argc, char** argv)
         // Each second, for a daemon that starts after us; one that has it already does nothing.
         if (i % 30 == 0) {
             character.utime = now_us();
-            int size = hair_character_t_encode(bytes, 0, sizeof bytes, &character);
-            lcm_publish(lcm, "HAIR_CHARACTER", bytes, (unsigned)size);
+            publish(lcm, "HAIR_CHARACTER", bytes,
+                    hair_character_t_encode(bytes, 0, sizeof bytes, &character));
         }
         hair_pose_t pose = head_at(character.slot, i / 30.0, i >= 15 * seconds);
-        int size = hair_pose_t_encode(bytes, 0, sizeof bytes, &pose);
-        lcm_publish(lcm, "HAIR_POSE", bytes, (unsigned)size);
+        publish(lcm, "HAIR_POSE", bytes, hair_pose_t_encode(bytes, 0, sizeof bytes, &pose));
         nanosleep(&(struct timespec){.tv_nsec = 1000000000 / 30}, NULL);
     }
     lcm_destroy(lcm);
