@@ -4,7 +4,9 @@
 #include "messages/link.h"
 #include "messages/log.h"
 #include "server/daemon.h"
+#include "server/kernel.h"
 #include "server/load.h"
+#include "server/models.h"
 #include "server/motion.h"
 
 #include <argp.h>
@@ -46,6 +48,8 @@ enum {
     KEY_CHARACTERS,
     KEY_MOTION,
     KEY_MODEL,
+    KEY_KERNEL,
+    KEY_FORCE,
     KEY_RATE,
     KEY_SUBSTEPS,
     KEY_ITERATIONS,
@@ -82,7 +86,10 @@ static const struct argp_option option_table[] = {
     {NULL, 0, NULL, 0, "How it moves:", 2},
     {"motion", KEY_MOTION, "NAME", 0,
      "none, bus (default), nod, shake, run, turn or teleport; bus obeys " CHANNEL_POSE, 2},
-    {"model", KEY_MODEL, "spring", 0, "Model of the strands", 2},
+    {"model", KEY_MODEL, "NAME", 0,
+     "spring (default): nodes on springs to their rest places; cascade: sprung joints that push "
+     "back; forest: links that turn in sprung joints; plain: a chain that only hangs",
+     2},
     {"rate", KEY_RATE, "HZ", 0, "Ticks a second (60)", 2},
     {"substeps", KEY_SUBSTEPS, "N", 0, "Steps of a tick (4)", 2},
     {"iterations", KEY_ITERATIONS, "N", 0, "Length corrections of a substep (1)", 2},
@@ -90,6 +97,10 @@ static const struct argp_option option_table[] = {
     {"damping", KEY_DAMPING, "S", 0, "Decay of velocity relative to the head, 1/s (8)", 2},
     {"gravity", KEY_GRAVITY, "on|off", 0,
      "on: rest is where gravity pulls from; off (default): gravity is compensated at rest", 2},
+    {"force", KEY_FORCE, NULL, 0, "Take a stiffness beyond the bound of stability", 2},
+    {"kernel", KEY_KERNEL, "NAME", 0,
+     "avx512, avx2, sse2 or scalar (default: the widest here); the result does not depend on it",
+     2},
     {"threads", KEY_THREADS, "N", 0, "Threads; the result does not depend on it (1)", 2},
     {"project", KEY_PROJECT, "on|off", 0, "Publish links at their exact lengths (on)", 2},
     {NULL, 0, NULL, 0, "Where it goes:", 3},
@@ -205,8 +216,17 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
                        text);
         break;
     case KEY_MODEL:
-        if (strcmp(text, "spring") != 0)
-            argp_error(state, "--model %s: only spring is there so far", text);
+        sim->model = model_find(text);
+        if (sim->model == MODEL_COUNT)
+            argp_error(state, "--model %s: must be spring, cascade, forest or plain", text);
+        break;
+    case KEY_KERNEL:
+        sim->kernel = text;
+        if (kernel_find(text) == NULL)
+            argp_error(state, "--kernel %s: must be one of %s here", text, kernel_names());
+        break;
+    case KEY_FORCE:
+        sim->force = true;
         break;
     case KEY_RATE:
         sim->rate_hz = number(state, "rate", text, 1, 1000);

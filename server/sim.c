@@ -3,11 +3,8 @@
 
 #include "messages/hairstyle.h"
 #include "messages/trig.h"
-#include "server/collide.h"
-#include "server/length.h"
-#include "server/roots.h"
-#include "server/shape.h"
-#include "server/spring.h"
+#include "server/models.h"
+#include "server/project.h"
 #include "server/strands.h"
 
 #include <math.h>
@@ -34,6 +31,7 @@ SimDefinition sim_default(void)
                            .damping_per_s = 8.0f,
                            .pearl_radius_m = 0.006f,
                            .gravity_compensation = true,
+                           .tip_mass = 1.0f,
                            .threads = 1};
 }
 
@@ -56,20 +54,31 @@ static bool check_rest(const SimDefinition* d, Fault* fault)
     return true;
 }
 
-// Verlet is stable while k dt^2 < 2 (1 + c) (notes/simulation.md 4.1); c > 0 here.
 static bool check_stiffness(const SimDefinition* d, Fault* fault)
 {
-    double steps_hz = d->rate_hz * d->substeps;
-    if (d->stiffness_s2 >= 0 && (double)d->stiffness_s2 <= 2.0 * steps_hz * steps_hz) return true;
-    return fault_set(fault,
-                     "simulation: stiffness_s2 is %g; %g Hz and %d substeps take 0 to %g, more of "
-                     "either takes more",
-                     (double)d->stiffness_s2, d->rate_hz, d->substeps, 2.0 * steps_hz * steps_hz);
+    double bound = model_stiffness_bound(d), k = (double)d->stiffness_s2;
+    if (!(k >= 0.0 && k <= 1e12))
+        return fault_set(fault, "simulation: stiffness_s2 is %g; it must be 0 to 1e12", k);
+    return k <= bound || d->force ||
+           fault_set(
+               fault,
+               "simulation: stiffness_s2 is %g; %s at %g Hz and %d substeps is stable to %.0f: "
+               "lower it, or raise either",
+               k, models[d->model].name, d->rate_hz, d->substeps, bound);
+}
+
+static bool check_model(const SimDefinition* d, Fault* fault)
+{
+    if ((int)d->model < 0 || d->model >= MODEL_COUNT)
+        return fault_set(fault, "simulation: model %d is unknown", (int)d->model);
+    return kernel_find(d->kernel) != NULL ||
+           fault_set(fault, "simulation: kernel \"%s\" is not to be had here; it must be one of %s",
+                     d->kernel, kernel_names());
 }
 
 static bool check(const SimDefinition* d, Fault* fault)
 {
-    return in_range(d->strands, 1, SIM_MAX_STRANDS, "strands", fault) &&
+    return check_model(d, fault) && in_range(d->strands, 1, SIM_MAX_STRANDS, "strands", fault) &&
            in_range(d->nodes, 2, SIM_MAX_NODES, "nodes", fault) &&
            in_range(d->collider_count, 0, HAIRSTYLE_MAX_COLLIDERS, "colliders", fault) &&
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
@@ -78,6 +87,7 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range((double)d->gravity_m_s2, -1000, 1000, "gravity_m_s2", fault) &&
            in_range((double)d->damping_per_s, 0, 1e4, "damping_per_s", fault) &&
            check_stiffness(d, fault) &&
+           in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
            in_range(d->fall_off_power, 0, 3, "fall_off_power", fault) &&
            in_range((double)d->pearl_radius_m, 0, 1, "pearl_radius_m", fault) &&
@@ -95,23 +105,25 @@ static void* cut(char** arena, size_t count, size_t size)
 static size_t block_bytes(const SimDefinition* d)
 {
     return (size_t)d->nodes *
-           (5 * sizeof(Lanes3) + (5 + (size_t)d->collider_count) * sizeof(Lanes));
+               (12 * sizeof(Lanes3) + (7 + (size_t)d->collider_count) * sizeof(Lanes)) +
+           sizeof(Lanes3);
 }
 
 static void cut_block(Block* block, const SimDefinition* d, char* arena)
 {
     size_t nodes = (size_t)d->nodes;
     block->nodes = d->nodes;
-    block->position = cut(&arena, nodes, sizeof(Lanes3));
-    block->previous = cut(&arena, nodes, sizeof(Lanes3));
-    block->reference = cut(&arena, nodes, sizeof(Lanes3));
-    block->acceleration = cut(&arena, nodes, sizeof(Lanes3));
-    block->rest = cut(&arena, nodes, sizeof(Lanes3));
-    block->length = cut(&arena, nodes, sizeof(Lanes));
-    block->keep = cut(&arena, nodes, sizeof(Lanes));
-    block->stiffness = cut(&arena, nodes, sizeof(Lanes));
-    block->outer_part = cut(&arena, nodes, sizeof(Lanes));
-    block->inner_part = cut(&arena, nodes, sizeof(Lanes));
+    Lanes3** vectors[] = {&block->position,  &block->previous,     &block->reference,
+                          &block->direction, &block->acceleration, &block->predicted,
+                          &block->rest,      &block->along,        &block->across,
+                          &block->carried};
+    for (size_t i = 0; i < sizeof vectors / sizeof vectors[0]; ++i)
+        *vectors[i] = cut(&arena, nodes, sizeof(Lanes3));
+    block->moment = cut(&arena, nodes + 1, sizeof(Lanes3));
+    Lanes** numbers[] = {&block->length, &block->keep,       &block->stiffness, &block->hinge,
+                         &block->mass,   &block->outer_part, &block->inner_part};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i)
+        *numbers[i] = cut(&arena, nodes, sizeof(Lanes));
     block->clearance = cut(&arena, nodes * (size_t)d->collider_count, sizeof(Lanes));
 }
 
@@ -121,23 +133,134 @@ static float weight_of(const SimDefinition* d, int strand, int node)
     return d->weight == NULL ? 1.0f : (float)d->weight[strand * d->nodes + node] / 255.0f;
 }
 
+static double mass_of(const SimDefinition* d, int node)
+{
+    return node == d->nodes - 1 ? (double)d->tip_mass : 1.0;
+}
+
+// What one substep leaves of a node's distance to its reference: weight^(60 dt), so that a weight
+// means the same at every rate (the share skinned in 1/60 s is 1 - weight).
+static float keep_of(const SimDefinition* d, float weight)
+{
+    if (weight <= 0.0f) return 0.0f;
+    if (weight >= 1.0f) return 1.0f;
+    return (float)trig_pow((double)weight, 60.0 / (d->rate_hz * d->substeps));
+}
+
+// How near a node may come to a collider's centre: the sphere's radius plus the pearl's, but never
+// more than its distance at rest: a groom whose rest pose dips into the head keeps its rest pose
+// instead of being blown off it.
+static float clearance_of(const SimDefinition* d, Sphere collider, Vec3 rest)
+{
+    return fminf(collider.radius + d->pearl_radius_m, vec3_length(vec3_sub(rest, collider.centre)));
+}
+
+static Vec3 link_of(const Vec3* rest, int n)
+{
+    return vec3_sub(rest[n], rest[n - 1]);
+}
+
+static float reach_of(const Vec3* rest, int n)
+{
+    float from_root = 0.0f;
+    for (int k = 1; k <= n; ++k)
+        from_root += vec3_length(link_of(rest, k));
+    return from_root;
+}
+
+// How a link's error is shared between its ends (thesis 4.2 with the sign that pulls a stretched
+// link together): by inverse mass, all at the free end where the other is skinned, none between
+// skinned ones.
+static void fill_shares(Block* block, const SimDefinition* d, int strand, int lane, int n)
+{
+    double inner = weight_of(d, strand, n - 1) == 0.0f ? 0.0 : 1.0 / mass_of(d, n - 1);
+    double outer = weight_of(d, strand, n) == 0.0f ? 0.0 : 1.0 / mass_of(d, n);
+    double sum = inner + outer > 0.0 ? inner + outer : 1.0;
+    block->inner_part[n].v[lane] = (real)(inner / sum);
+    block->outer_part[n].v[lane] = (real)(outer / sum);
+}
+
+// K of joint n over the mass of a node: k/m d^2, d from the middle of one link to that of the next.
+// A clamped root has half a link to bend, so it is twice as stiff (notes/simulation.md 1).
+static void fill_hinge(Block* block, const SimDefinition* d, const Vec3* rest, int lane, int n)
+{
+    double k = (double)model_stiffness(d, reach_of(rest, n - 1));
+    double length = (double)vec3_length(link_of(rest, n));
+    if (n > 1) length = 0.5 * (length + (double)vec3_length(link_of(rest, n - 1)));
+    block->hinge[n].v[lane] = (real)((n == 1 ? 2.0 : 1.0) * k * length * length);
+}
+
+static void fill_link(Block* block, const SimDefinition* d, int strand, int lane, int n)
+{
+    const Vec3* rest = d->rest + (size_t)strand * (size_t)d->nodes;
+    block->length[n].v[lane] = (real)vec3_length(link_of(rest, n));
+    fill_shares(block, d, strand, lane, n);
+    fill_hinge(block, d, rest, lane, n);
+}
+
 static void fill_node(Block* block, const SimDefinition* d, int strand, int lane, int n)
 {
     const Vec3* rest = d->rest + (size_t)strand * (size_t)d->nodes;
-    float weight = weight_of(d, strand, n);
     lane_set(&block->rest[n], lane, rest[n]);
-    block->keep[n].v[lane] = shape_keep(weight, 1.0 / (d->rate_hz * d->substeps));
+    block->keep[n].v[lane] = (real)keep_of(d, weight_of(d, strand, n));
     for (int k = 0; k < d->collider_count; ++k)
         block->clearance[k * d->nodes + n].v[lane] =
-            collide_clearance(d->colliders[k], d->pearl_radius_m, rest[n]);
-    float from_root = 0.0f;
-    for (int k = 1; k <= n; ++k)
-        from_root += vec3_length(vec3_sub(rest[k], rest[k - 1]));
-    block->stiffness[n].v[lane] = spring_stiffness(d, from_root);
-    if (n == 0) return;
-    block->length[n].v[lane] = vec3_length(vec3_sub(rest[n], rest[n - 1]));
-    length_shares(&block->inner_part[n].v[lane], &block->outer_part[n].v[lane],
-                  weight_of(d, strand, n - 1) == 0.0f, weight == 0.0f);
+            (real)clearance_of(d, d->colliders[k], rest[n]);
+    block->stiffness[n].v[lane] = (real)model_stiffness(d, reach_of(rest, n));
+    block->mass[n].v[lane] = (real)mass_of(d, n);
+    if (n > 0) fill_link(block, d, strand, lane, n);
+}
+
+// A vector in the frame (d, u, d x u).
+static Vec3 into_frame(Vec3 v, Vec3 d, Vec3 u)
+{
+    return vec3(vec3_dot(v, d), vec3_dot(v, u), vec3_dot(v, vec3_cross(d, u)));
+}
+
+static Vec3 across(Vec3 d)
+{
+    Vec3 axis = fabsf(d.x) < 0.6f ? vec3(1, 0, 0) : vec3(0, 0, 1);
+    return vec3_normalise_or(vec3_mad(axis, d, -vec3_dot(axis, d)), vec3(0, 0, 1));
+}
+
+// The moments in the joints that carry the weight of the strand at rest: from T[n] - T[n+1] +
+// length d x F[n] = 0 on each link, F the weight outboard, tip first. They are fixed in the frames,
+// like a bend in the strand: in its rest pose it does not sag, tilted it hangs another way. Too
+// soft a strand that stands up falls over all the same.
+static void fill_carried(Vec3* carried, const SimDefinition* d, const Vec3* rest)
+{
+    Vec3 moment = vec3(0, 0, 0), load = vec3(0, 0, 0);
+    bool is_carried = d->gravity_compensation && models[d->model].has_hinges;
+    for (int n = d->nodes - 1; n >= 1; --n) {
+        load.y -= is_carried ? d->gravity_m_s2 * (float)mass_of(d, n) : 0.0f;
+        moment = vec3_sub(moment, vec3_cross(link_of(rest, n), load));
+        carried[n] = moment;
+    }
+}
+
+// The strand's shape at rest as the frames of frames.h see it: each link in the frame of the one
+// before, the first in head space. The same axis is carried along the links by the same rotation.
+static void fill_frames(Block* block, const SimDefinition* d, int strand, int lane)
+{
+    const Vec3* rest = d->rest + (size_t)strand * (size_t)d->nodes;
+    Vec3 way = vec3_normalise_or(link_of(rest, 1), vec3(0, -1, 0)), u = across(way);
+    Vec3 carried[SIM_MAX_NODES];
+    fill_carried(carried, d, rest);
+    lane_set(&block->carried[1], lane, carried[1]);
+    lane_set(&block->along[1], lane, way);
+    lane_set(&block->across[1], lane, u);
+    for (int n = 2; n < d->nodes; ++n) {
+        Vec3 next = vec3_normalise_or(link_of(rest, n), way), b = vec3_cross(way, next);
+        float c = vec3_dot(way, next), f = vec3_dot(b, u) / fmaxf(1.0f + c, 1e-4f);
+        Vec3 turned = vec3_mad(vec3_add(vec3_scale(u, c), vec3_cross(b, u)), b, f);
+        turned = vec3_mad(turned, next, -vec3_dot(turned, next));
+        turned = vec3_normalise_or(turned, across(next));
+        lane_set(&block->along[n], lane, into_frame(next, way, u));
+        lane_set(&block->across[n], lane, into_frame(turned, way, u));
+        lane_set(&block->carried[n], lane, into_frame(carried[n], way, u));
+        way = next;
+        u = turned;
+    }
 }
 
 static void fill_block(Block* block, const SimDefinition* d, int first)
@@ -146,6 +269,7 @@ static void fill_block(Block* block, const SimDefinition* d, int first)
         int strand = first + lane < d->strands ? first + lane : d->strands - 1;
         for (int n = 0; n < d->nodes; ++n)
             fill_node(block, d, strand, lane, n);
+        fill_frames(block, d, strand, lane);
     }
 }
 
@@ -153,11 +277,14 @@ static void fill_substeps(Sim* sim)
 {
     const SimDefinition* d = &sim->definition;
     double dt = 1.0 / (d->rate_hz * d->substeps);
+    bool compensated = d->gravity_compensation && d->model == MODEL_SPRING;
     for (int s = 0; s < d->substeps; ++s)
         sim->substeps[s] =
             (Substep){.dt2 = (float)(dt * dt),
+                      .model = (int)d->model,
+                      .outermost = d->outermost,
                       .velocity_kept = (float)trig_exp(-(double)d->damping_per_s * dt),
-                      .gravity_m_s2 = spring_gravity(d),
+                      .gravity_m_s2 = compensated ? 0.0f : d->gravity_m_s2,
                       .iterations = d->iterations,
                       .collider_count = d->collider_count};
 }
@@ -184,6 +311,7 @@ static void fill(Sim* sim, const SimDefinition* d)
     for (int k = 0; k < d->collider_count; ++k)
         sim->colliders[k] = d->colliders[k];
     sim->definition = *d;
+    sim->kernel = kernel_find(d->kernel);
     sim->definition.rest = NULL;
     sim->definition.weight = NULL;
     sim->definition.colliders = NULL;
@@ -216,12 +344,19 @@ void sim_destroy(Sim* sim)
     free(sim);
 }
 
+static void place(Block* block, const float rotation[9])
+{
+    for (int n = 0; n < block->nodes; ++n)
+        for (int l = 0; l < LANES; ++l)
+            lane_set(&block->reference[n], l, rotate(rotation, lane_get(&block->rest[n], l)));
+}
+
 void sim_reset(Sim* sim, const float rotation[9])
 {
     memcpy(sim->rotation, rotation, sizeof sim->rotation);
     for (int b = 0; b < sim->block_count; ++b) {
         Block* block = &sim->blocks[b];
-        roots_place(block, rotation);
+        place(block, rotation);
         size_t bytes = (size_t)block->nodes * sizeof(Lanes3);
         memcpy(block->position, block->reference, bytes);
         memcpy(block->previous, block->reference, bytes);
@@ -254,11 +389,11 @@ static void read_strand(const Block* block, int lane, const float rotation[9], b
     float lengths[SIM_MAX_NODES];
     for (int n = 0; n < block->nodes; ++n) {
         skinned[n] = block->keep[n].v[lane] == 0.0f;
-        lengths[n] = block->length[n].v[lane];
+        lengths[n] = (float)block->length[n].v[lane];
         strand[n] = skinned[n] ? lane_get(&block->rest[n], lane)
                                : rotate_back(rotation, lane_get(&block->position[n], lane));
     }
-    if (project) length_project(strand, block->nodes, lengths, skinned);
+    if (project) project_lengths(strand, block->nodes, lengths, skinned);
 }
 
 void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* positions)

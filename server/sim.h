@@ -13,25 +13,43 @@
 
 typedef struct Sim Sim;
 
+// A way for strands to move: a file of forces, a row in kernel.c, a row in models.c.
+typedef enum ModelKind {
+    MODEL_SPRING,
+    MODEL_CASCADE,
+    MODEL_FOREST,
+    MODEL_PLAIN,
+    MODEL_COUNT
+} ModelKind;
+
 // What is simulated and how. Start from sim_default().
 typedef struct SimDefinition {
+    ModelKind model;
+    const char* kernel; // "avx512", "avx2", "sse2", "scalar"; NULL: the widest that runs here
     int strands, nodes; // nodes of every strand, node 0 the root
     const Vec3* rest;   // [strand][node], head space, m; copied
     const uint8_t*
         weight; // [strand][node], 255 physics ... 0 skinned; NULL: all physics but node 0
     const Sphere* colliders; // head space; copied
     int collider_count;
-    double rate_hz;       // ticks a second
-    int substeps;         // of a tick
-    int iterations;       // length-correction sweeps a substep
-    float gravity_m_s2;   // along -Y
-    float stiffness_s2;   // k/m of the first node, 1/s^2
+    double rate_hz;     // ticks a second
+    int substeps;       // of a tick
+    int iterations;     // length-correction sweeps a substep
+    float gravity_m_s2; // along -Y
+    // k/m, 1/s^2: of the first node's spring to its rest place (spring), or across the first joint,
+    // EI / (m d^3) (cascade, forest).
+    float stiffness_s2;
     float fall_off_per_m; // c in k(L) = k / max(1, c L)^a, L m from the root (thesis 5.9, mended)
     int fall_off_power;   // a: 0 none, 1 linear, 2 quadratic, 3 cubic
     float damping_per_s;  // velocity relative to the head decays as exp(-damping t)
     float pearl_radius_m; // every node collides as a sphere of this radius (Nalu 23.2.2)
-    bool gravity_compensation; // rest is equilibrium under gravity at every tilt
-    int threads;               // OpenMP threads over blocks; result does not depend on it
+    // Rest is equilibrium under gravity: at every tilt (spring), untilted (cascade, forest: the
+    // joints carry the weight), not at all (plain).
+    bool gravity_compensation;
+    float tip_mass; // of the last node, in masses of the others: 1, or a half
+    bool outermost; // forest: the head's acceleration acts on the tips alone
+    bool force;     // take what is beyond the stability bound
+    int threads;    // OpenMP threads over blocks; result does not depend on it
 } SimDefinition;
 
 SimDefinition sim_default(void);
