@@ -37,22 +37,25 @@ static const Stages stages[MODEL_COUNT] = {
     [MODEL_PLAIN] = {plain_accelerate, integrate_verlet, false},
 };
 
-// The table of contents of the dynamics: what happens in a substep, in which order.
-static void substep(Block* block, const Substep* s, const Stages* model)
+// The table of contents of the dynamics: what happens in a substep, in which order. Of a few
+// blocks: see length.h.
+static void substep(Block* blocks, int count, const Substep* s, const Stages* model)
 {
-    roots_place(block, s->rotation);
-    model->accelerate(block, s);
-    model->integrate(block, s);
-    shape_blend(block);
-    for (int i = 0; i < s->iterations && !model->keeps_lengths; ++i)
-        length_correct(block);
-    collide_spheres(block, s);
+    for (int b = 0; b < count; ++b) {
+        roots_place(&blocks[b], s->rotation);
+        model->accelerate(&blocks[b], s);
+        model->integrate(&blocks[b], s);
+        shape_blend(&blocks[b]);
+    }
+    if (!model->keeps_lengths) length_correct(blocks, count, s->iterations);
+    for (int b = 0; b < count; ++b)
+        collide_spheres(&blocks[b], s);
 }
 
-static void step(Block* block, const Substep* substeps, int count)
+static void step(Block* blocks, int count, const Substep* substeps, int substep_count)
 {
-    for (int s = 0; s < count; ++s)
-        substep(block, &substeps[s], &stages[substeps[s].model]);
+    for (int s = 0; s < substep_count; ++s)
+        substep(blocks, count, &substeps[s], &stages[substeps[s].model]);
 }
 
 #define JOIN(a, b)   JOINED(a, b)

@@ -10,11 +10,13 @@
 typedef struct Block Block;
 typedef struct Substep Substep;
 
+#define KERNEL_GANG 2 // blocks side by side; four no longer fit the first cache
+
 typedef struct Kernel {
     const char* name; // of the instruction set
     int width;        // floats that one instruction works on
-    // `count` substeps of one block; it stays in the cache for all of them.
-    void (*step)(Block* block, const Substep* substeps, int count);
+    // All substeps of a tick of `count` blocks, 1 to KERNEL_GANG; they stay in the cache meanwhile.
+    void (*step)(Block* blocks, int count, const Substep* substeps, int substep_count);
 } Kernel;
 
 // The widest that this processor has for NULL; else the one of that name, or NULL where the build

@@ -24,17 +24,25 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
     }
 }
 
+static void step_gang(const Sim* sim, int gang)
+{
+    int first = gang * KERNEL_GANG, left = sim->block_count - first;
+    sim->kernel->step(&sim->blocks[first], left < KERNEL_GANG ? left : KERNEL_GANG, sim->substeps,
+                      sim->definition.substeps);
+}
+
 void sim_step(Sim* sim, const SimHead* heads)
 {
     prepare_substeps(sim, heads);
-    int blocks = sim->block_count, threads = sim->definition.threads;
+    int gangs = (sim->block_count + KERNEL_GANG - 1) / KERNEL_GANG;
+    int threads = sim->definition.threads;
     // libgomp allocates a team for a nested region, even of one thread; a plain loop does not.
-    if (threads <= 1 || blocks == 1 || omp_in_parallel()) {
-        for (int b = 0; b < blocks; ++b)
-            sim->kernel->step(&sim->blocks[b], sim->substeps, sim->definition.substeps);
+    if (threads <= 1 || gangs == 1 || omp_in_parallel()) {
+        for (int g = 0; g < gangs; ++g)
+            step_gang(sim, g);
         return;
     }
 #pragma omp parallel for num_threads(threads) schedule(static)
-    for (int b = 0; b < blocks; ++b)
-        sim->kernel->step(&sim->blocks[b], sim->substeps, sim->definition.substeps);
+    for (int g = 0; g < gangs; ++g)
+        step_gang(sim, g);
 }
