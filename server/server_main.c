@@ -85,7 +85,9 @@ static const struct argp_option option_table[] = {
     {"info", KEY_INFO, NULL, 0, "Print the loaded style and exit", 1},
     {NULL, 0, NULL, 0, "How it moves:", 2},
     {"motion", KEY_MOTION, "NAME", 0,
-     "none, bus (default), nod, shake, run, turn or teleport; bus obeys " CHANNEL_POSE, 2},
+     "none, bus (default), nod, shake, jump-stop, run, flip, turn, teleport or gust; bus "
+     "obeys " CHANNEL_POSE,
+     2},
     {"model", KEY_MODEL, "NAME", 0,
      "spring (default): nodes on springs to their rest places; cascade: sprung joints that push "
      "back; forest: links that turn in sprung joints; plain: a chain that only hangs",
@@ -212,7 +214,9 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
     case KEY_MOTION:
         options->daemon.motion = text;
         if (motion_find(text) == NULL)
-            argp_error(state, "--motion %s: must be none, bus, nod, shake, run, turn or teleport",
+            argp_error(state,
+                       "--motion %s: must be none, bus, nod, shake, jump-stop, run, flip, turn, "
+                       "teleport or gust",
                        text);
         break;
     case KEY_MODEL:
