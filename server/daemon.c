@@ -497,7 +497,7 @@ static void follow_freeze(Slot* slot)
 
 static void move_head(Slot* slot, SimHead* head, double t)
 {
-    MotionState state = {.segment = slot->motion_segment};
+    MotionState state = {.segment = slot->motion_segment}; // the bus brings none of it
     Pose next = path_at(slot, t, &state);
     Vec3d move = vec3d_sub(next.position, slot->head.position), change = {0, 0, 0};
     if (state.segment == slot->motion_segment) {
@@ -510,6 +510,8 @@ static void move_head(Slot* slot, SimHead* head, double t)
     slot->head = next;
     quat_matrix(head->rotation, next.orientation);
     head->second_difference = vec3_from(change);
+    head->move = vec3_from(slot->move);
+    head->wind = vec3_from(state.wind);
 }
 
 static void step_slot(Daemon* daemon, Slot* slot)

@@ -12,6 +12,7 @@
 #define NEAR_LOOP _Pragma("omp simd reduction(| : near)")
 #endif
 
+#include "server/air.h"
 #include "server/collide.h"
 #include "server/frames.h"
 #include "server/integrate.h"
@@ -42,6 +43,7 @@ static void substep(Block* block, const Substep* s, const Stages* model)
 {
     roots_place(block, s->rotation);
     model->accelerate(block, s);
+    if (s->drag > 0 && !model->keeps_lengths) air_drag(block, s);
     model->integrate(block, s);
     shape_blend(block);
     for (int i = 0; i < s->iterations && !model->keeps_lengths; ++i)

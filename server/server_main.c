@@ -55,6 +55,7 @@ enum {
     KEY_ITERATIONS,
     KEY_STIFFNESS,
     KEY_DAMPING,
+    KEY_DRAG,
     KEY_GRAVITY,
     KEY_THREADS,
     KEY_PROJECT,
@@ -97,6 +98,8 @@ static const struct argp_option option_table[] = {
     {"iterations", KEY_ITERATIONS, "N", 0, "Length corrections of a substep (1)", 2},
     {"stiffness", KEY_STIFFNESS, "S2", 0, "k/m at the root, 1/s^2 (1600); falls to the tip", 2},
     {"damping", KEY_DAMPING, "S", 0, "Decay of velocity relative to the head, 1/s (8)", 2},
+    {"drag", KEY_DRAG, "S", 0, "Decay of velocity relative to the air where a wind blows, 1/s (1)",
+     2},
     {"gravity", KEY_GRAVITY, "on|off", 0,
      "on: rest is where gravity pulls from; off (default): gravity is compensated at rest", 2},
     {"force", KEY_FORCE, NULL, 0, "Take a stiffness beyond the bound of stability", 2},
@@ -246,6 +249,9 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
         break;
     case KEY_DAMPING:
         sim->damping_per_s = (float)number(state, "damping", text, 0, 1e4);
+        break;
+    case KEY_DRAG:
+        sim->drag_per_s = (float)number(state, "drag", text, 0, 1e4);
         break;
     case KEY_GRAVITY:
         sim->gravity_compensation = !on_off(state, "gravity", text);

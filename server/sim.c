@@ -29,6 +29,7 @@ SimDefinition sim_default(void)
                            .fall_off_per_m = 25.0f,
                            .fall_off_power = 2,
                            .damping_per_s = 8.0f,
+                           .drag_per_s = 1.0f,
                            .pearl_radius_m = 0.006f,
                            .gravity_compensation = true,
                            .tip_mass = 1.0f,
@@ -86,6 +87,7 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range(d->iterations, 0, SIM_MAX_ITERATIONS, "iterations", fault) &&
            in_range((double)d->gravity_m_s2, -1000, 1000, "gravity_m_s2", fault) &&
            in_range((double)d->damping_per_s, 0, 1e4, "damping_per_s", fault) &&
+           in_range((double)d->drag_per_s, 0, 1e4, "drag_per_s", fault) &&
            check_stiffness(d, fault) &&
            in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
@@ -280,7 +282,8 @@ static void fill_substeps(Sim* sim)
     bool compensated = d->gravity_compensation && d->model == MODEL_SPRING;
     for (int s = 0; s < d->substeps; ++s)
         sim->substeps[s] =
-            (Substep){.dt2 = (float)(dt * dt),
+            (Substep){.dt = (float)dt,
+                      .dt2 = (float)(dt * dt),
                       .model = (int)d->model,
                       .outermost = d->outermost,
                       .velocity_kept = (float)trig_exp(-(double)d->damping_per_s * dt),

@@ -42,6 +42,7 @@ typedef struct SimDefinition {
     float fall_off_per_m; // c in k(L) = k / max(1, c L)^a, L m from the root (thesis 5.9, mended)
     int fall_off_power;   // a: 0 none, 1 linear, 2 quadratic, 3 cubic
     float damping_per_s;  // velocity relative to the head decays as exp(-damping t)
+    float drag_per_s;     // where a wind blows, velocity relative to it decays as exp(-drag t)
     float pearl_radius_m; // every node collides as a sphere of this radius (Nalu 23.2.2)
     // Rest is equilibrium under gravity: at every tilt (spring), untilted (cascade, forest: the
     // joints carry the weight), not at all (plain).
@@ -58,10 +59,14 @@ SimDefinition sim_default(void);
 Sim* sim_create(const SimDefinition* definition, Fault* fault);
 void sim_destroy(Sim* sim);
 
-// The head at the end of one substep, relative to the state's origin.
+// The head at the end of one substep, and the air around it, relative to the state's origin.
 typedef struct SimHead {
     float rotation[9];      // row-major: world = rotation * head
     Vec3 second_difference; // x(t+dt) - 2 x(t) + x(t-dt) of the head's position, m, world axes
+    Vec3 move;              // x(t+dt) - x(t) of it; only the wind asks
+    // Velocity of the air, world axes, m/s. Without a wind there is no drag: damping stands for
+    // still air. Drag comes in over the first m/s, so that a breeze is no jolt.
+    Vec3 wind;
 } SimHead;
 
 // Advances one tick; `heads` has one entry per substep. Allocates nothing.

@@ -373,6 +373,35 @@ static void a_teleporting_motion_keeps_hair_at_rest(void** state)
     daemon_destroy(rest);
 }
 
+// Tips that are further than 5 % of the box from where `other` has them, along x.
+static int tips_blown(void)
+{
+    int blown = 0;
+    for (int i = 0; i < 64; ++i) {
+        int at = (i * 8 + 7) * 3;
+        blown += heard.positions[0][at] - other.positions[0][at] > 65535 / 20;
+    }
+    return blown;
+}
+
+static void a_gust_visibly_moves_long_hair_and_it_comes_back(void** state)
+{
+    (void)state;
+    DaemonOptions a = options_for(&heard, "gust"), b = options_for(&other, "none");
+    Daemon *blown = create(&a, &heard), *rest = create(&b, &other);
+    tick(rest, &other);
+    for (int n = 0; n < 240; ++n) {
+        tick(blown, &heard);
+        if (n == 0) assert_int_equal(tips_blown(), 0);
+        if (n == 50) assert_true(tips_blown() > 32);
+    }
+    for (int i = 0; i < 64 * 8 * 3; ++i)
+        assert_in_range(heard.positions[0][i] + 200 - other.positions[0][i], 0, 400);
+    assert_int_equal(daemon_status(blown).clamped, 0);
+    daemon_destroy(blown);
+    daemon_destroy(rest);
+}
+
 static void inputs_wait_for_the_tick_and_are_said_as_applied(void** state)
 {
     (void)state;
@@ -642,6 +671,7 @@ int main(void)
         cmocka_unit_test(a_reset_brings_hair_to_rest_and_a_fast_follow_does_not),
         cmocka_unit_test(frozen_hair_is_rigid_with_the_head_and_thaws_where_it_was),
         cmocka_unit_test(a_teleporting_motion_keeps_hair_at_rest),
+        cmocka_unit_test(a_gust_visibly_moves_long_hair_and_it_comes_back),
         cmocka_unit_test(inputs_wait_for_the_tick_and_are_said_as_applied),
         cmocka_unit_test(a_flood_of_poses_keeps_the_newest),
         cmocka_unit_test(characters_come_and_go),
