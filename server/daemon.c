@@ -27,7 +27,8 @@
     X(OVERFLOW)                                                                                    \
     X(STYLE)                                                                                       \
     X(EMPTY_SLOT)                                                                                  \
-    X(POSE_IN_CODE)
+    X(POSE_IN_CODE)                                                                                \
+    X(QUARANTINE)
 
 typedef enum Complaint {
 #define COMPLAINT_ENUM(name) COMPLAINT_##name,
@@ -55,7 +56,8 @@ typedef struct Slot {
     bool frozen;
     Quat frozen_orientation; // the hair's state stays as it was under this one
     int64_t clamped;
-    SimHead* heads; // of one tick
+    int64_t quarantined; // of its strands, as counted below
+    SimHead* heads;      // of one tick
     PublishPlanes planes;
 } Slot;
 
@@ -80,7 +82,7 @@ struct Daemon {
     int64_t since_status_us;
     int64_t step_us, step_count;
     double mean_step_us;
-    int64_t overruns, rejected;
+    int64_t overruns, rejected, quarantined;
     bool complained[COMPLAINT_COUNT];
 };
 
@@ -101,12 +103,18 @@ bool daemon_use_scene(DaemonOptions* options, const char* path, Fault* fault)
     return true;
 }
 
-static void complain(Daemon* daemon, Complaint kind, const char* text)
+static void remark(Daemon* daemon, Complaint kind, const char* text)
 {
-    ++daemon->rejected;
     if (daemon->complained[kind]) return;
     daemon->complained[kind] = true;
     notice_say(&daemon->options.notice, "%s (said once; later ones are counted)", text);
+}
+
+// Of what is refused.
+static void complain(Daemon* daemon, Complaint kind, const char* text)
+{
+    ++daemon->rejected;
+    remark(daemon, kind, text);
 }
 
 // Characters -------------------------------------------------------------------------------------
@@ -542,6 +550,24 @@ static void step_slots(Daemon* daemon)
         step_slot(daemon, daemon->slots[daemon->order[i]]);
 }
 
+// Here rather than where it is stepped: characters are stepped side by side.
+static void count_quarantined(Daemon* daemon)
+{
+    char text[160];
+    for (int i = 0; i < daemon->used; ++i) {
+        Slot* slot = daemon->slots[daemon->order[i]];
+        int64_t count = sim_quarantined(slot->sim);
+        if (count == slot->quarantined) continue;
+        daemon->quarantined += count - slot->quarantined;
+        slot->quarantined = count;
+        snprintf(text, sizeof text,
+                 "strands of character %d were not finite or 1 km from the head and are back at "
+                 "rest; lower the stiffness or raise the substeps",
+                 slot->number);
+        remark(daemon, COMPLAINT_QUARANTINE, text);
+    }
+}
+
 static void begin_epoch(Daemon* daemon, int64_t epoch)
 {
     daemon->publisher.epoch = epoch;
@@ -587,6 +613,7 @@ void daemon_tick(Daemon* daemon)
             : base_wall_us();
     consume_inputs(daemon);
     step_slots(daemon);
+    count_quarantined(daemon);
     ++daemon->steps;
     count_step(daemon, base_monotonic_us() - start);
 }
@@ -637,7 +664,8 @@ static void publish_status(Daemon* daemon)
                              .clamped = status.clamped,
                              .rejected = status.rejected,
                              .sent_messages = status.sent_messages,
-                             .sent_bytes = status.sent_bytes};
+                             .sent_bytes = status.sent_bytes,
+                             .quarantined = status.quarantined};
     uint8_t bytes[CONTROL_MAX_BYTES];
     publish_bytes(&daemon->publisher, daemon->utime, CHANNEL_STATUS, bytes,
                   status_encode(bytes, sizeof bytes, &message));
@@ -714,7 +742,8 @@ DaemonStatus daemon_status(const Daemon* daemon)
                            .overruns = daemon->overruns,
                            .rejected = daemon->rejected,
                            .sent_messages = daemon->publisher.sent_messages,
-                           .sent_bytes = daemon->publisher.sent_bytes};
+                           .sent_bytes = daemon->publisher.sent_bytes,
+                           .quarantined = daemon->quarantined};
     for (int i = 0; i < daemon->used; ++i) {
         const Slot* slot = daemon->slots[daemon->order[i]];
         status.strands += daemon->styles[slot->style].hair->guide_count;

@@ -21,6 +21,7 @@
 #include "server/model_forest.h"
 #include "server/model_plain.h"
 #include "server/model_spring.h"
+#include "server/quarantine.h"
 #include "server/roots.h"
 #include "server/shape.h"
 
@@ -55,6 +56,7 @@ static void step(Block* block, const Substep* substeps, int count)
 {
     for (int s = 0; s < count; ++s)
         substep(block, &substeps[s], &stages[substeps[s].model]);
+    quarantine_lost(block);
 }
 
 #define JOIN(a, b)   JOINED(a, b)

@@ -579,9 +579,10 @@ static void finish(Server* server)
         DaemonStatus status = daemon_status(server->daemon);
         fprintf(stderr,
                 "hair-server: %" PRId64 " messages, %" PRId64 " bytes, %" PRId64
-                " ticks dropped, %" PRId64 " inputs refused, %" PRId64 " coordinates clamped\n",
+                " ticks dropped, %" PRId64 " inputs refused, %" PRId64
+                " coordinates clamped, %" PRId64 " strands put back to rest\n",
                 status.sent_messages, status.sent_bytes, status.overruns, status.rejected,
-                status.clamped);
+                status.clamped, status.quarantined);
     }
 }
 

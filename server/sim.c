@@ -267,6 +267,7 @@ static void fill_frames(Block* block, const SimDefinition* d, int strand, int la
 
 static void fill_block(Block* block, const SimDefinition* d, int first)
 {
+    block->strands = d->strands - first < LANES ? d->strands - first : LANES;
     for (int lane = 0; lane < LANES; ++lane) {
         int strand = first + lane < d->strands ? first + lane : d->strands - 1;
         for (int n = 0; n < d->nodes; ++n)
@@ -415,6 +416,14 @@ void sim_state(const Sim* sim, Vec3* positions, Vec3* previous)
         positions[i] = lane_get(&block->position[i % nodes], i / nodes % LANES);
         previous[i] = lane_get(&block->previous[i % nodes], i / nodes % LANES);
     }
+}
+
+int64_t sim_quarantined(const Sim* sim)
+{
+    int64_t sum = 0;
+    for (int b = 0; b < sim->block_count; ++b)
+        sum += sim->blocks[b].quarantined;
+    return sum;
 }
 
 void sim_hash(const Sim* sim, void* hash_state)

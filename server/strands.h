@@ -11,6 +11,7 @@
 #include "server/kernel.h"
 
 #include <math.h>
+#include <stdint.h>
 
 #define LANES 32
 
@@ -31,6 +32,7 @@ typedef float real;
 #define SETTLED    1e-11f
 #endif
 #define LEAST_LENGTH_M 1e-9f // below it a link has no direction
+#define LOST_M         1e3f  // from the head: no hair is there
 
 typedef struct Lanes {
     real v[LANES];
@@ -44,6 +46,8 @@ typedef struct Lanes3 {
 // to n, stands at n, and entry 0 is unused.
 struct Block {
     int nodes;
+    int strands;         // lanes beyond them repeat the last
+    int64_t quarantined; // times that a strand was put back (quarantine.h)
     // State: world axes, relative to the head's position, m.
     Lanes3* position;
     Lanes3* previous; // one substep ago

@@ -541,6 +541,30 @@ static void bad_bytes_are_counted_and_noticed_once_a_kind(void** state)
     daemon_destroy(daemon);
 }
 
+static void lost_strands_are_put_back_told_once_and_counted(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "shake");
+    options.sim.stiffness_s2 = 1e6f;
+    options.sim.force = true;
+    options.sim.iterations = 0;
+    Daemon* daemon = create(&options, &heard);
+    for (int n = 0; n < 240; ++n) {
+        tick(daemon, &heard);
+        daemon_publish_background(daemon, 16667);
+    }
+    assert_int_equal(heard.notices, 1);
+    assert_non_null(strstr(heard.notice, "character 0"));
+    assert_in_range(daemon_status(daemon).quarantined, 65, 240 * 64);
+    assert_in_range(heard.status.quarantined, 64, daemon_status(daemon).quarantined);
+    int64_t before = daemon_status(daemon).quarantined;
+    send_character(daemon, 0, CHARACTER_REMOVE, "");
+    tick(daemon, &heard);
+    assert_int_equal(daemon_status(daemon).quarantined, before);
+    assert_int_equal(daemon_status(daemon).rejected, 0);
+    daemon_destroy(daemon);
+}
+
 static void hear_epoch(Daemon* daemon, int64_t epoch)
 {
     uint8_t bytes[CONTROL_MAX_BYTES];
@@ -679,6 +703,7 @@ int main(void)
         cmocka_unit_test(adding_another_style_changes_it),
         cmocka_unit_test(an_unknown_style_is_told_the_known_ones),
         cmocka_unit_test(bad_bytes_are_counted_and_noticed_once_a_kind),
+        cmocka_unit_test(lost_strands_are_put_back_told_once_and_counted),
         cmocka_unit_test(a_new_daemon_outbids_a_higher_epoch_once),
         cmocka_unit_test(steady_state_allocates_nothing),
         cmocka_unit_test(a_scene_says_styles_characters_and_physics),
