@@ -15,7 +15,7 @@ enum {
     POSE_BYTES = 79,
     CHARACTER_BYTES = 51,
     REQUEST_BYTES = 27 + STYLE_MAX_PARTS / 8,
-    STATUS_BYTES = 92,
+    STATUS_BYTES = 100,
     APPLIED_HEADER_BYTES = 52,
 };
 
@@ -291,7 +291,7 @@ static bool check_status(const StatusMessage* m, Fault* fault)
     if (m->characters < 0 || m->characters > CHANNEL_MAX_SLOTS)
         return fault_set(fault, "status: %d characters: 0 to %d", m->characters, CHANNEL_MAX_SLOTS);
     if (m->strands < 0 || m->overruns < 0 || m->clamped < 0 || m->rejected < 0 ||
-        m->sent_messages < 0 || m->sent_bytes < 0 || m->quarantined < 0)
+        m->sent_messages < 0 || m->sent_bytes < 0 || m->quarantined < 0 || m->jumps < 0)
         return fault_set(fault, "status: a count is negative");
     return true;
 }
@@ -313,6 +313,7 @@ size_t status_encode(uint8_t* bytes, size_t capacity, const StatusMessage* messa
     put64(&bytes, (uint64_t)message->sent_messages);
     put64(&bytes, (uint64_t)message->sent_bytes);
     put64(&bytes, (uint64_t)message->quarantined);
+    put64(&bytes, (uint64_t)message->jumps);
     return STATUS_BYTES;
 }
 
@@ -334,6 +335,7 @@ bool status_decode(StatusMessage* message, const uint8_t* bytes, size_t size, Fa
     m.sent_messages = (int64_t)take64(&bytes);
     m.sent_bytes = (int64_t)take64(&bytes);
     m.quarantined = (int64_t)take64(&bytes);
+    m.jumps = (int64_t)take64(&bytes);
     if (!check_status(&m, fault)) return false;
     *message = m;
     return true;

@@ -53,6 +53,7 @@ typedef struct StatusMessage {
     int64_t rejected; // messages refused since the start
     int64_t sent_messages, sent_bytes;
     int64_t quarantined; // strands put back to rest since the start: not finite or 1 km away
+    int64_t jumps;       // of heads that did not raise their segment, since the start
 } StatusMessage;
 
 // An input as it was consumed at a tick boundary: what re-simulation replays.

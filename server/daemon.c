@@ -28,7 +28,8 @@
     X(STYLE)                                                                                       \
     X(EMPTY_SLOT)                                                                                  \
     X(POSE_IN_CODE)                                                                                \
-    X(QUARANTINE)
+    X(QUARANTINE)                                                                                  \
+    X(JUMP)
 
 typedef enum Complaint {
 #define COMPLAINT_ENUM(name) COMPLAINT_##name,
@@ -82,7 +83,7 @@ struct Daemon {
     int64_t since_status_us;
     int64_t step_us, step_count;
     double mean_step_us;
-    int64_t overruns, rejected, quarantined;
+    int64_t overruns, rejected, quarantined, jumps;
     bool complained[COMPLAINT_COUNT];
 };
 
@@ -424,6 +425,18 @@ static void apply_character(Daemon* daemon, const CharacterMessage* message)
         complain(daemon, COMPLAINT_CHARACTER, fault.text);
 }
 
+static void push_pose(Daemon* daemon, Slot* slot, const PoseMessage* message)
+{
+    char text[160];
+    if (!poses_push(&slot->poses, message, time_of(daemon, daemon->steps, 0))) return;
+    ++daemon->jumps;
+    snprintf(text, sizeof text,
+             "the head of character %d jumped without raising its segment: taken as a carry; raise "
+             "the segment of " CHANNEL_POSE " at a teleport",
+             slot->number);
+    remark(daemon, COMPLAINT_JUMP, text);
+}
+
 static void apply_pose(Daemon* daemon, const PoseMessage* message)
 {
     Slot* slot = daemon->slots[message->slot];
@@ -433,7 +446,7 @@ static void apply_pose(Daemon* daemon, const PoseMessage* message)
         complain(daemon, COMPLAINT_POSE_IN_CODE,
                  "a pose for a character that moves by itself; start with --motion bus");
     else
-        poses_push(&slot->poses, message, time_of(daemon, daemon->steps, 0));
+        push_pose(daemon, slot, message);
 }
 
 static void publish_applied(Daemon* daemon, const Input* input)
@@ -665,7 +678,8 @@ static void publish_status(Daemon* daemon)
                              .rejected = status.rejected,
                              .sent_messages = status.sent_messages,
                              .sent_bytes = status.sent_bytes,
-                             .quarantined = status.quarantined};
+                             .quarantined = status.quarantined,
+                             .jumps = status.jumps};
     uint8_t bytes[CONTROL_MAX_BYTES];
     publish_bytes(&daemon->publisher, daemon->utime, CHANNEL_STATUS, bytes,
                   status_encode(bytes, sizeof bytes, &message));
@@ -743,7 +757,8 @@ DaemonStatus daemon_status(const Daemon* daemon)
                            .rejected = daemon->rejected,
                            .sent_messages = daemon->publisher.sent_messages,
                            .sent_bytes = daemon->publisher.sent_bytes,
-                           .quarantined = daemon->quarantined};
+                           .quarantined = daemon->quarantined,
+                           .jumps = daemon->jumps};
     for (int i = 0; i < daemon->used; ++i) {
         const Slot* slot = daemon->slots[daemon->order[i]];
         status.strands += daemon->styles[slot->style].hair->guide_count;

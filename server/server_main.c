@@ -580,9 +580,10 @@ static void finish(Server* server)
         fprintf(stderr,
                 "hair-server: %" PRId64 " messages, %" PRId64 " bytes, %" PRId64
                 " ticks dropped, %" PRId64 " inputs refused, %" PRId64
-                " coordinates clamped, %" PRId64 " strands put back to rest\n",
+                " coordinates clamped, %" PRId64 " strands put back to rest, %" PRId64
+                " jumps carried\n",
                 status.sent_messages, status.sent_bytes, status.overruns, status.rejected,
-                status.clamped, status.quarantined);
+                status.clamped, status.quarantined, status.jumps);
     }
 }
 

@@ -39,7 +39,8 @@ static const StatusMessage STATUS = {.utime = 8,
                                      .rejected = 3,
                                      .sent_messages = 4,
                                      .sent_bytes = 5000000000,
-                                     .quarantined = 6};
+                                     .quarantined = 6,
+                                     .jumps = 7};
 static const uint8_t PAYLOAD[] = {9, 8, 7, 6, 5};
 static const AppliedMessage APPLIED = {.utime = 8,
                                        .epoch = 9,
@@ -71,7 +72,7 @@ static size_t encode_with_lcm_gen(int kind, uint8_t* bytes)
     hair_pose_t pose = {5, {1, -2, 3e5}, {0.6, 0, 0, 0.8}, 9, 7, 1};
     hair_character_t character = {6, 1023, 1, "long"};
     hair_request_t request = {7, (int64_t)REQUEST.style_hash, 3, 1, {1, 2, [511] = 3}};
-    hair_status_t status = {8, 9, 10, 60, 123.5f, 2, 128, 1, 2, 3, 4, 5000000000, 6};
+    hair_status_t status = {8, 9, 10, 60, 123.5f, 2, 128, 1, 2, 3, 4, 5000000000, 6, 7};
     hair_applied_t applied = {8, 9, 10, "HAIR_POSE", sizeof PAYLOAD, (uint8_t*)PAYLOAD};
     switch (kind) {
     case 0:
@@ -155,6 +156,7 @@ static void control_decode_returns_what_was_encoded(void** state)
     assert_true(status.sent_bytes == 5000000000 && status.step_us == 123.5f);
     assert_true(status.clamped == 2 && status.rejected == 3 && status.strands == 128);
     assert_int_equal(status.quarantined, 6);
+    assert_int_equal(status.jumps, 7);
     AppliedMessage applied;
     assert_true(applied_decode(&applied, bytes, encode(4, bytes, sizeof bytes), NULL));
     assert_string_equal(applied.channel, "HAIR_POSE");
@@ -222,6 +224,7 @@ static void control_decode_names_every_wrong_field(void** state)
         {3, 40, 4, 0x80000000u, "count"},
         {3, 76, 8, UINT64_MAX, "count"},
         {3, 84, 8, UINT64_MAX, "count"},
+        {3, 92, 8, UINT64_MAX, "count"},
         {4, 24, 4, 0x80000000u, "tick"},
         {4, 28, 1, 0, "channel"},
         {4, 30, 1, 7, "channel"},

@@ -309,6 +309,33 @@ static void a_carry_leaves_the_hair_bit_equal(void** state)
     daemon_destroy(carried);
 }
 
+static void a_jump_without_a_segment_is_carried_told_once_and_counted(void** state)
+{
+    (void)state;
+    DaemonOptions a = options_for(&heard, "bus"), b = options_for(&other, "bus");
+    Daemon *still = create(&a, &heard), *jumping = create(&b, &other);
+    for (int n = 0; n < 240; ++n) {
+        double sway = n < 60 ? 0.3 * sin(4.0 * M_PI * n / 60.0) : 0.0;
+        double jump = n < 120 ? 0.0 : n < 180 ? 2.0 : 1.0;
+        send_pose_of(still, n / 60.0, sway, 0.0, 1, POSE_FOLLOW);
+        send_pose_of(jumping, n / 60.0, sway + jump, 0.0, 1, POSE_FOLLOW);
+        tick(still, &heard);
+        tick(jumping, &other);
+        daemon_publish_background(jumping, 16667);
+        assert_true(same_hair());
+        assert_int_equal(other.frame[0].segment, heard.frame[0].segment + (n >= 120) + (n >= 180));
+    }
+    assert_true(other.frame[0].pose.position.x == 1.0);
+    assert_int_equal(other.notices, 1);
+    assert_non_null(strstr(other.notice, "jumped"));
+    assert_int_equal(daemon_status(jumping).jumps, 2);
+    assert_int_equal(daemon_status(jumping).rejected, 0);
+    assert_int_equal(other.status.jumps, 2);
+    assert_int_equal(daemon_status(still).jumps, 0);
+    daemon_destroy(still);
+    daemon_destroy(jumping);
+}
+
 static void a_reset_brings_hair_to_rest_and_a_fast_follow_does_not(void** state)
 {
     (void)state;
@@ -692,6 +719,7 @@ int main(void)
         cmocka_unit_test(styles_are_sent_at_once_and_again_each_second),
         cmocka_unit_test(a_request_brings_the_parts_it_names),
         cmocka_unit_test(a_carry_leaves_the_hair_bit_equal),
+        cmocka_unit_test(a_jump_without_a_segment_is_carried_told_once_and_counted),
         cmocka_unit_test(a_reset_brings_hair_to_rest_and_a_fast_follow_does_not),
         cmocka_unit_test(frozen_hair_is_rigid_with_the_head_and_thaws_where_it_was),
         cmocka_unit_test(a_teleporting_motion_keeps_hair_at_rest),

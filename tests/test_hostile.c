@@ -34,7 +34,7 @@ static const Kind kinds[] = {
     {CHANNEL_POSE, __hair_pose_t_get_hash, 79},
     {CHANNEL_CHARACTER, __hair_character_t_get_hash, 51},
     {CHANNEL_REQUEST, __hair_request_t_get_hash, 539},
-    {CHANNEL_STATUS, __hair_status_t_get_hash, 92},
+    {CHANNEL_STATUS, __hair_status_t_get_hash, 100},
 };
 #define KINDS (sizeof kinds / sizeof kinds[0])
 
