@@ -128,6 +128,8 @@ static const char documentation[] =
     "  hair-server                              long hair, 60 Hz, this host\n"
     "  hair-server --motion shake               a head that shakes\n"
     "  hair-server --style bob --motion bus     a head moved by " CHANNEL_POSE " messages\n"
+    "  hair-server --motion gust --drag 2       wind; " CHANNEL_WIND " and " CHANNEL_TUNING "\n"
+    "                                           messages change both while it runs\n"
     "  hair-server --style tail.tfx --style top.tfx --head head.obj --info\n"
     "  hair-server --motion nod --ticks 240 --fast --record nod.lcmlog\n"
     "  hair-server --motion shake --ticks 600 --fast --hash\n"
@@ -424,8 +426,8 @@ static void hear(void* context, const char* channel, const uint8_t* bytes, size_
 
 static bool open_bus(Server* server, Fault* fault)
 {
-    static const char* const heard[] = {CHANNEL_POSE, CHANNEL_CHARACTER, CHANNEL_REQUEST,
-                                        CHANNEL_STATUS};
+    static const char* const heard[] = {CHANNEL_POSE,   CHANNEL_CHARACTER, CHANNEL_WIND,
+                                        CHANNEL_TUNING, CHANNEL_REQUEST,   CHANNEL_STATUS};
     server->link = link_open(server->options->url, fault);
     if (server->link == NULL) return false;
     for (size_t i = 0; i < sizeof heard / sizeof heard[0]; ++i)

@@ -71,6 +71,15 @@ typedef struct SimHead {
     Vec3 wind;
 } SimHead;
 
+// Takes stiffness, damping, gravity, drag, iterations and pearl radius from `wanted`, from the next
+// step on; the state is not touched, nothing is allocated, and the rest of `wanted` is not read.
+// Compensation of gravity stays that of the first definition: hair tuned to less of it (under
+// water) rises. False with a fault where a value is out of range; nothing is then changed.
+bool sim_tune(Sim* sim, const SimDefinition* wanted, Fault* fault);
+
+// What is simulated now; its pointers are NULL.
+const SimDefinition* sim_definition(const Sim* sim);
+
 // Advances one tick; `heads` has one entry per substep. Allocates nothing.
 void sim_step(Sim* sim, const SimHead* heads);
 

@@ -93,6 +93,7 @@ struct Substep {
 struct Sim {
     SimDefinition definition; // its pointers are NULL: everything was copied
     const Kernel* kernel;
+    float gravity_at_rest; // m/s^2: what the rest pose was made for, whatever gravity is tuned to
     int block_count;
     Block* blocks;
     Sphere* colliders;
