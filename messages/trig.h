@@ -30,10 +30,11 @@ static inline double trig_cos(double x)
     return trig_sin(x + 0.5 * TRIG_PI);
 }
 
-// exp(x) for |x| < 700: halved ten times, Taylor to x^12, squared back.
+// exp(x) for x < 700, 0 below -700: halved ten times, Taylor to x^12, squared back.
 static inline double trig_exp(double x)
 {
     double r = x / 1024.0, sum = 1.0;
+    if (x < -700.0) return 0.0;
     for (int i = 12; i >= 1; --i)
         sum = 1.0 + r * sum / i;
     for (int i = 0; i < 10; ++i)

@@ -12,6 +12,7 @@
 #define NEAR_LOOP _Pragma("omp simd reduction(| : near)")
 #endif
 
+#include "server/air.h"
 #include "server/collide.h"
 #include "server/frames.h"
 #include "server/integrate.h"
@@ -20,6 +21,7 @@
 #include "server/model_forest.h"
 #include "server/model_plain.h"
 #include "server/model_spring.h"
+#include "server/quarantine.h"
 #include "server/roots.h"
 #include "server/shape.h"
 
@@ -44,6 +46,7 @@ static void substep(Block* blocks, int count, const Substep* s, const Stages* mo
     for (int b = 0; b < count; ++b) {
         roots_place(&blocks[b], s->rotation);
         model->accelerate(&blocks[b], s);
+        if (s->drag > 0 && !model->keeps_lengths) air_drag(&blocks[b], s);
         model->integrate(&blocks[b], s);
         shape_blend(&blocks[b]);
     }
@@ -56,6 +59,8 @@ static void step(Block* blocks, int count, const Substep* substeps, int substep_
 {
     for (int s = 0; s < substep_count; ++s)
         substep(blocks, count, &substeps[s], &stages[substeps[s].model]);
+    for (int b = 0; b < count; ++b)
+        quarantine_lost(&blocks[b]);
 }
 
 #define JOIN(a, b)   JOINED(a, b)

@@ -13,6 +13,7 @@
 // What it lacks: a link does not feel the inertia of those outboard of it.
 #pragma once
 
+#include "server/air.h"
 #include "server/frames.h"
 
 #define LEAST_HALF   1e-3f // cos of half the angle of a joint that counts as folded
@@ -73,6 +74,7 @@ static void forest_turn(Block* block, const Substep* substep)
         Lanes3* out = &block->acceleration[n];
         bool is_tip = n == block->nodes - 1;
         real share = is_tip || !substep->outermost ? 1 : 0;
+        if (substep->drag > 0) air_load(block, substep, n, &load);
         LANE_LOOP
         for (int l = 0; l < LANES; ++l) {
             real dx = d->x[l], dy = d->y[l], dz = d->z[l];

@@ -29,7 +29,8 @@ double model_stiffness_bound(const SimDefinition* d)
 {
     double steps_hz = d->rate_hz * d->substeps, mode = models[d->model].stiffest_mode;
     double kept = trig_exp(-(double)d->damping_per_s / steps_hz);
-    return mode > 0.0 ? 2.0 * (1.0 + kept) * steps_hz * steps_hz / mode : 1e30;
+    double passed = trig_exp(-(double)d->drag_per_s / steps_hz); // what a wind leaves (air.h)
+    return mode > 0.0 ? 2.0 * (passed + kept) * steps_hz * steps_hz / mode : 1e30;
 }
 
 float model_stiffness(const SimDefinition* definition, float from_root_m)

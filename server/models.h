@@ -18,7 +18,7 @@ extern const Model models[MODEL_COUNT];
 // MODEL_COUNT where there is none of that name.
 ModelKind model_find(const char* name);
 
-// The largest stable stiffness_s2 for the rate, substeps and damping of `definition`.
+// The largest stable stiffness_s2 for the rate, substeps, damping and drag of `definition`.
 double model_stiffness_bound(const SimDefinition* definition);
 
 // k/m, 1/s^2, `from_root_m` along the strand at rest: k / max(1, c L)^a. Thesis 5.9 prints k / (L

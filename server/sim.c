@@ -29,6 +29,7 @@ SimDefinition sim_default(void)
                            .fall_off_per_m = 25.0f,
                            .fall_off_power = 2,
                            .damping_per_s = 8.0f,
+                           .drag_per_s = 1.0f,
                            .pearl_radius_m = 0.006f,
                            .gravity_compensation = true,
                            .tip_mass = 1.0f,
@@ -76,21 +77,27 @@ static bool check_model(const SimDefinition* d, Fault* fault)
                      d->kernel, kernel_names());
 }
 
+// What sim_tune may change.
+static bool check_tuned(const SimDefinition* d, Fault* fault)
+{
+    return in_range(d->iterations, 0, SIM_MAX_ITERATIONS, "iterations", fault) &&
+           in_range((double)d->gravity_m_s2, -1000, 1000, "gravity_m_s2", fault) &&
+           in_range((double)d->damping_per_s, 0, 1e4, "damping_per_s", fault) &&
+           in_range((double)d->drag_per_s, 0, 1e4, "drag_per_s", fault) &&
+           check_stiffness(d, fault) &&
+           in_range((double)d->pearl_radius_m, 0, 1, "pearl_radius_m", fault);
+}
+
 static bool check(const SimDefinition* d, Fault* fault)
 {
     return check_model(d, fault) && in_range(d->strands, 1, SIM_MAX_STRANDS, "strands", fault) &&
            in_range(d->nodes, 2, SIM_MAX_NODES, "nodes", fault) &&
            in_range(d->collider_count, 0, HAIRSTYLE_MAX_COLLIDERS, "colliders", fault) &&
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
-           in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) &&
-           in_range(d->iterations, 0, SIM_MAX_ITERATIONS, "iterations", fault) &&
-           in_range((double)d->gravity_m_s2, -1000, 1000, "gravity_m_s2", fault) &&
-           in_range((double)d->damping_per_s, 0, 1e4, "damping_per_s", fault) &&
-           check_stiffness(d, fault) &&
+           in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) && check_tuned(d, fault) &&
            in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
            in_range(d->fall_off_power, 0, 3, "fall_off_power", fault) &&
-           in_range((double)d->pearl_radius_m, 0, 1, "pearl_radius_m", fault) &&
            in_range(d->threads, 1, 256, "threads", fault) && check_rest(d, fault);
 }
 
@@ -190,12 +197,16 @@ static void fill_hinge(Block* block, const SimDefinition* d, const Vec3* rest, i
     block->hinge[n].v[lane] = (real)((n == 1 ? 2.0 : 1.0) * k * length * length);
 }
 
-static void fill_link(Block* block, const SimDefinition* d, int strand, int lane, int n)
+// What sim_tune may change.
+static void fill_tuned(Block* block, const SimDefinition* d, const Vec3* rest, int lane)
 {
-    const Vec3* rest = d->rest + (size_t)strand * (size_t)d->nodes;
-    block->length[n].v[lane] = (real)vec3_length(link_of(rest, n));
-    fill_shares(block, d, strand, lane, n);
-    fill_hinge(block, d, rest, lane, n);
+    for (int n = 0; n < d->nodes; ++n) {
+        for (int k = 0; k < d->collider_count; ++k)
+            block->clearance[k * d->nodes + n].v[lane] =
+                (real)clearance_of(d, d->colliders[k], rest[n]);
+        block->stiffness[n].v[lane] = (real)model_stiffness(d, reach_of(rest, n));
+        if (n > 0) fill_hinge(block, d, rest, lane, n);
+    }
 }
 
 static void fill_node(Block* block, const SimDefinition* d, int strand, int lane, int n)
@@ -203,12 +214,10 @@ static void fill_node(Block* block, const SimDefinition* d, int strand, int lane
     const Vec3* rest = d->rest + (size_t)strand * (size_t)d->nodes;
     lane_set(&block->rest[n], lane, rest[n]);
     block->keep[n].v[lane] = (real)keep_of(d, weight_of(d, strand, n));
-    for (int k = 0; k < d->collider_count; ++k)
-        block->clearance[k * d->nodes + n].v[lane] =
-            (real)clearance_of(d, d->colliders[k], rest[n]);
-    block->stiffness[n].v[lane] = (real)model_stiffness(d, reach_of(rest, n));
     block->mass[n].v[lane] = (real)mass_of(d, n);
-    if (n > 0) fill_link(block, d, strand, lane, n);
+    if (n == 0) return;
+    block->length[n].v[lane] = (real)vec3_length(link_of(rest, n));
+    fill_shares(block, d, strand, lane, n);
 }
 
 // A vector in the frame (d, u, d x u).
@@ -265,10 +274,12 @@ static void fill_frames(Block* block, const SimDefinition* d, int strand, int la
 
 static void fill_block(Block* block, const SimDefinition* d, int first)
 {
+    block->strands = d->strands - first < LANES ? d->strands - first : LANES;
     for (int lane = 0; lane < LANES; ++lane) {
         int strand = first + lane < d->strands ? first + lane : d->strands - 1;
         for (int n = 0; n < d->nodes; ++n)
             fill_node(block, d, strand, lane, n);
+        fill_tuned(block, d, d->rest + (size_t)strand * (size_t)d->nodes, lane);
         fill_frames(block, d, strand, lane);
     }
 }
@@ -278,13 +289,15 @@ static void fill_substeps(Sim* sim)
     const SimDefinition* d = &sim->definition;
     double dt = 1.0 / (d->rate_hz * d->substeps);
     bool compensated = d->gravity_compensation && d->model == MODEL_SPRING;
+    float gravity = d->gravity_m_s2 - (compensated ? sim->gravity_at_rest : 0.0f);
     for (int s = 0; s < d->substeps; ++s)
         sim->substeps[s] =
-            (Substep){.dt2 = (float)(dt * dt),
+            (Substep){.dt = (float)dt,
+                      .dt2 = (float)(dt * dt),
                       .model = (int)d->model,
                       .outermost = d->outermost,
                       .velocity_kept = (float)trig_exp(-(double)d->damping_per_s * dt),
-                      .gravity_m_s2 = compensated ? 0.0f : d->gravity_m_s2,
+                      .gravity_m_s2 = gravity,
                       .iterations = d->iterations,
                       .collider_count = d->collider_count};
 }
@@ -311,6 +324,7 @@ static void fill(Sim* sim, const SimDefinition* d)
     for (int k = 0; k < d->collider_count; ++k)
         sim->colliders[k] = d->colliders[k];
     sim->definition = *d;
+    sim->gravity_at_rest = d->gravity_m_s2;
     sim->kernel = kernel_find(d->kernel);
     sim->definition.rest = NULL;
     sim->definition.weight = NULL;
@@ -342,6 +356,41 @@ void sim_destroy(Sim* sim)
     free(sim->colliders);
     free(sim->centres);
     free(sim);
+}
+
+static bool is_tuned_alike(const SimDefinition* a, const SimDefinition* b)
+{
+    return a->stiffness_s2 == b->stiffness_s2 && a->damping_per_s == b->damping_per_s &&
+           a->gravity_m_s2 == b->gravity_m_s2 && a->drag_per_s == b->drag_per_s &&
+           a->iterations == b->iterations && a->pearl_radius_m == b->pearl_radius_m;
+}
+
+bool sim_tune(Sim* sim, const SimDefinition* wanted, Fault* fault)
+{
+    SimDefinition d = sim->definition;
+    d.stiffness_s2 = wanted->stiffness_s2;
+    d.damping_per_s = wanted->damping_per_s;
+    d.gravity_m_s2 = wanted->gravity_m_s2;
+    d.drag_per_s = wanted->drag_per_s;
+    d.iterations = wanted->iterations;
+    d.pearl_radius_m = wanted->pearl_radius_m;
+    if (!check_tuned(&d, fault)) return false;
+    if (is_tuned_alike(&d, &sim->definition)) return true; // senders repeat themselves
+    sim->definition = d;
+    fill_substeps(sim);
+    d.colliders = sim->colliders;
+    Vec3 rest[SIM_MAX_NODES];
+    for (int i = 0; i < sim->block_count * LANES; ++i) {
+        for (int n = 0; n < d.nodes; ++n)
+            rest[n] = lane_get(&sim->blocks[i / LANES].rest[n], i % LANES);
+        fill_tuned(&sim->blocks[i / LANES], &d, rest, i % LANES);
+    }
+    return true;
+}
+
+const SimDefinition* sim_definition(const Sim* sim)
+{
+    return &sim->definition;
 }
 
 static void place(Block* block, const float rotation[9])
@@ -412,6 +461,14 @@ void sim_state(const Sim* sim, Vec3* positions, Vec3* previous)
         positions[i] = lane_get(&block->position[i % nodes], i / nodes % LANES);
         previous[i] = lane_get(&block->previous[i % nodes], i / nodes % LANES);
     }
+}
+
+int64_t sim_quarantined(const Sim* sim)
+{
+    int64_t sum = 0;
+    for (int b = 0; b < sim->block_count; ++b)
+        sum += sim->blocks[b].quarantined;
+    return sum;
 }
 
 void sim_hash(const Sim* sim, void* hash_state)

@@ -11,6 +11,8 @@
 #include "messages/base.h"
 #include "messages/vec.h"
 
+#include <stdint.h>
+
 typedef struct Sim Sim;
 
 // A way for strands to move: a file of forces, a row in kernel.c, a row in models.c.
@@ -42,6 +44,7 @@ typedef struct SimDefinition {
     float fall_off_per_m; // c in k(L) = k / max(1, c L)^a, L m from the root (thesis 5.9, mended)
     int fall_off_power;   // a: 0 none, 1 linear, 2 quadratic, 3 cubic
     float damping_per_s;  // velocity relative to the head decays as exp(-damping t)
+    float drag_per_s;     // where a wind blows, velocity relative to it decays as exp(-drag t)
     float pearl_radius_m; // every node collides as a sphere of this radius (Nalu 23.2.2)
     // Rest is equilibrium under gravity: at every tilt (spring), untilted (cascade, forest: the
     // joints carry the weight), not at all (plain).
@@ -58,11 +61,24 @@ SimDefinition sim_default(void);
 Sim* sim_create(const SimDefinition* definition, Fault* fault);
 void sim_destroy(Sim* sim);
 
-// The head at the end of one substep, relative to the state's origin.
+// The head at the end of one substep, and the air around it, relative to the state's origin.
 typedef struct SimHead {
     float rotation[9];      // row-major: world = rotation * head
     Vec3 second_difference; // x(t+dt) - 2 x(t) + x(t-dt) of the head's position, m, world axes
+    Vec3 move;              // x(t+dt) - x(t) of it; only the wind asks
+    // Velocity of the air, world axes, m/s. Without a wind there is no drag: damping stands for
+    // still air. Drag comes in over the first m/s, so that a breeze is no jolt.
+    Vec3 wind;
 } SimHead;
+
+// Takes stiffness, damping, gravity, drag, iterations and pearl radius from `wanted`, from the next
+// step on; the state is not touched, nothing is allocated, and the rest of `wanted` is not read.
+// Compensation of gravity stays that of the first definition: hair tuned to less of it (under
+// water) rises. False with a fault where a value is out of range; nothing is then changed.
+bool sim_tune(Sim* sim, const SimDefinition* wanted, Fault* fault);
+
+// What is simulated now; its pointers are NULL.
+const SimDefinition* sim_definition(const Sim* sim);
 
 // Advances one tick; `heads` has one entry per substep. Allocates nothing.
 void sim_step(Sim* sim, const SimHead* heads);
@@ -79,6 +95,10 @@ void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* 
 
 // World-axes positions relative to the head, as simulated: [strand][node]; for measurements.
 void sim_state(const Sim* sim, Vec3* positions, Vec3* previous);
+
+// How many times a strand was put back to rest at the end of a tick, because a node of it was not
+// finite or 1 km away. The other strands are not touched.
+int64_t sim_quarantined(const Sim* sim);
 
 // Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position then
 // previous position; padding lanes left out. `hash_state` is an XXH64_state_t*.

@@ -1,10 +1,21 @@
 // A tick: the head's motion to substeps, blocks to kernels, blocks to threads.
+#include "messages/trig.h"
 #include "server/strands.h"
 
 #include <omp.h>
 #include <string.h>
 
-// The parts of the substeps that the head's motion decides.
+#define FULL_DRAG_M_S 1.0f // of wind
+
+static void meet_air(const SimDefinition* definition, Substep* substep, const SimHead* head)
+{
+    double speed = (double)(vec3_length(head->wind) / FULL_DRAG_M_S);
+    double drag = (double)definition->drag_per_s * trig_smooth(speed);
+    substep->drag = drag > 0.0 ? (float)(1.0 - trig_exp(-drag * (double)substep->dt)) : 0.0f;
+    substep->air_move = vec3_sub(vec3_scale(head->wind, substep->dt), head->move);
+}
+
+// The parts of the substeps that the head's motion decides, and the wind.
 static void prepare_substeps(Sim* sim, const SimHead* heads)
 {
     int colliders = sim->definition.collider_count;
@@ -12,6 +23,7 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
         Substep* substep = &sim->substeps[s];
         memcpy(substep->rotation, heads[s].rotation, sizeof substep->rotation);
         substep->second_difference = heads[s].second_difference;
+        meet_air(&sim->definition, substep, &heads[s]);
         Vec3* centre = sim->centres + 2 * colliders * s;
         Vec3* move = centre + colliders;
         for (int k = 0; k < colliders; ++k) {

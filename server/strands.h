@@ -11,6 +11,7 @@
 #include "server/kernel.h"
 
 #include <math.h>
+#include <stdint.h>
 
 #define LANES 32
 
@@ -31,6 +32,7 @@ typedef float real;
 #define SETTLED    1e-11f
 #endif
 #define LEAST_LENGTH_M 1e-9f // below it a link has no direction
+#define LOST_M         1e3f  // from the head: no hair is there
 
 typedef struct Lanes {
     real v[LANES];
@@ -44,6 +46,8 @@ typedef struct Lanes3 {
 // to n, stands at n, and entry 0 is unused.
 struct Block {
     int nodes;
+    int strands;         // lanes beyond them repeat the last
+    int64_t quarantined; // times that a strand was put back (quarantine.h)
     // State: world axes, relative to the head's position, m.
     Lanes3* position;
     Lanes3* previous; // one substep ago
@@ -76,6 +80,8 @@ struct Substep {
     float dt2;              // s^2
     float velocity_kept;    // exp(-damping dt)
     float gravity_m_s2;     // what compensation leaves of it
+    float drag;             // the share of a node's velocity against the air that the air takes
+    Vec3 air_move;          // of the air past the head, m
     int model;              // ModelKind
     int iterations;
     bool outermost; // forest: the head's acceleration acts on the tips alone
@@ -87,6 +93,7 @@ struct Substep {
 struct Sim {
     SimDefinition definition; // its pointers are NULL: everything was copied
     const Kernel* kernel;
+    float gravity_at_rest; // m/s^2: what the rest pose was made for, whatever gravity is tuned to
     int block_count;
     Block* blocks;
     Sphere* colliders;

@@ -71,7 +71,7 @@ static uint64_t hash_of_run(int threads, float pearl_radius_m)
     Sim* sim = sim_create(&d, &fault);
     if (sim == NULL) fail_msg("%s", fault.text);
     for (int tick = 0; tick < TICKS; ++tick) {
-        SimHead heads[4];
+        SimHead heads[4] = {0};
         for (int s = 0; s < 4; ++s)
             head_at(&heads[s], (tick * 4 + s + 1) / 240.0, 1.0 / 240.0);
         sim_step(sim, heads);

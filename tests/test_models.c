@@ -442,8 +442,9 @@ static bool is_stable(ModelKind model, int links, float k, float damping)
             most = x > most || !isfinite(x) ? x : most;
         }
     }
+    bool was_lost = sim_quarantined(strand.sim) > 0; // and put back, where it looks calm
     sim_destroy(strand.sim);
-    return most < 1e-3 * LENGTH_M;
+    return !was_lost && most < 1e-3 * LENGTH_M;
 }
 
 // Where it begins to grow, in k dt^2, by bisection.
