@@ -18,7 +18,9 @@
 #include "server/integrate.h"
 #include "server/length.h"
 #include "server/model_cascade.h"
+#include "server/model_cascade_thesis.h"
 #include "server/model_forest.h"
+#include "server/model_forest_z.h"
 #include "server/model_plain.h"
 #include "server/model_spring.h"
 #include "server/quarantine.h"
@@ -37,6 +39,8 @@ static const Stages stages[MODEL_COUNT] = {
     [MODEL_CASCADE] = {cascade_accelerate, integrate_verlet, false},
     [MODEL_FOREST] = {forest_accelerate, forest_swing, true},
     [MODEL_PLAIN] = {plain_accelerate, integrate_verlet, false},
+    [MODEL_CASCADE_THESIS] = {cascade_thesis_accelerate, integrate_verlet, false},
+    [MODEL_FOREST_Z] = {forest_z_accelerate, forest_z_turn, true},
 };
 
 // The table of contents of the dynamics: what happens in a substep, in which order. Of a few

@@ -45,6 +45,8 @@ static void quarantine_lost(Block* block)
         for (int n = 0; n < block->nodes; ++n) {
             rest_lane(&block->position[n], &block->reference[n], l);
             rest_lane(&block->previous[n], &block->reference[n], l);
+            block->angle[n].theta[l] = block->angle[n].phi[l] = 0;
+            block->rate[n].theta[l] = block->rate[n].phi[l] = 0;
         }
         block->quarantined += l < block->strands; // lanes beyond repeat the last strand
     }

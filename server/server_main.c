@@ -91,7 +91,9 @@ static const struct argp_option option_table[] = {
      2},
     {"model", KEY_MODEL, "NAME", 0,
      "spring (default): nodes on springs to their rest places; cascade: sprung joints that push "
-     "back; forest: links that turn in sprung joints; plain: a chain that only hangs",
+     "back; forest: links that turn in sprung joints; plain: a chain that only hangs; as printed, "
+     "with their failures: cascade-thesis: sprung joints that nothing pushes back; forest-z: two "
+     "angles a joint, which lock",
      2},
     {"rate", KEY_RATE, "HZ", 0, "Ticks a second (60)", 2},
     {"substeps", KEY_SUBSTEPS, "N", 0, "Steps of a tick (4)", 2},
@@ -227,7 +229,10 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
     case KEY_MODEL:
         sim->model = model_find(text);
         if (sim->model == MODEL_COUNT)
-            argp_error(state, "--model %s: must be spring, cascade, forest or plain", text);
+            argp_error(
+                state,
+                "--model %s: must be spring, cascade, forest, plain, cascade-thesis or forest-z",
+                text);
         break;
     case KEY_KERNEL:
         sim->kernel = text;

@@ -4,6 +4,7 @@
 #include "messages/hairstyle.h"
 #include "messages/trig.h"
 #include "server/models.h"
+#include "server/printed.h"
 #include "server/project.h"
 #include "server/strands.h"
 
@@ -30,6 +31,8 @@ SimDefinition sim_default(void)
                            .fall_off_power = 2,
                            .damping_per_s = 8.0f,
                            .drag_per_s = 1.0f,
+                           .joint_damping_per_s = 60.0f,
+                           .down_share = 0.05f,
                            .pearl_radius_m = 0.006f,
                            .gravity_compensation = true,
                            .tip_mass = 1.0f,
@@ -68,6 +71,17 @@ static bool check_stiffness(const SimDefinition* d, Fault* fault)
                k, models[d->model].name, d->rate_hz, d->substeps, bound);
 }
 
+static bool check_joint_damping(const SimDefinition* d, Fault* fault)
+{
+    double bound = model_joint_damping_bound(d), v = (double)d->joint_damping_per_s;
+    if (!in_range(v, 0, 1e6, "joint_damping_per_s", fault)) return false;
+    return v <= bound || d->force ||
+           fault_set(fault,
+                     "simulation: joint_damping_per_s is %g; %s at %g Hz and %d substeps is stable "
+                     "to %.0f: lower it, or raise either",
+                     v, models[d->model].name, d->rate_hz, d->substeps, bound);
+}
+
 static bool check_model(const SimDefinition* d, Fault* fault)
 {
     if ((int)d->model < 0 || d->model >= MODEL_COUNT)
@@ -95,6 +109,8 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range(d->collider_count, 0, HAIRSTYLE_MAX_COLLIDERS, "colliders", fault) &&
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
            in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) && check_tuned(d, fault) &&
+           check_joint_damping(d, fault) &&
+           in_range((double)d->down_share, 0, 1, "down_share", fault) &&
            in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
            in_range(d->fall_off_power, 0, 3, "fall_off_power", fault) &&
@@ -111,8 +127,8 @@ static void* cut(char** arena, size_t count, size_t size)
 
 static size_t block_bytes(const SimDefinition* d)
 {
-    return (size_t)d->nodes *
-               (12 * sizeof(Lanes3) + (7 + (size_t)d->collider_count) * sizeof(Lanes)) +
+    return (size_t)d->nodes * (14 * sizeof(Lanes3) + 3 * sizeof(Angles) +
+                               (8 + (size_t)d->collider_count) * sizeof(Lanes)) +
            sizeof(Lanes3);
 }
 
@@ -132,6 +148,14 @@ static void cut_block(Block* block, const SimDefinition* d, char* arena)
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i)
         *numbers[i] = cut(&arena, nodes, sizeof(Lanes));
     block->clearance = cut(&arena, nodes * (size_t)d->collider_count, sizeof(Lanes));
+    // Last, so that they lie in nobody else's way.
+    Lanes3** places[] = {&block->upward, &block->downward};
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; ++i)
+        *places[i] = cut(&arena, nodes, sizeof(Lanes3));
+    Angles** angles[] = {&block->angle, &block->rate, &block->rest_angle};
+    for (size_t i = 0; i < sizeof angles / sizeof angles[0]; ++i)
+        *angles[i] = cut(&arena, nodes, sizeof(Angles));
+    block->friction = cut(&arena, nodes, sizeof(Lanes));
 }
 
 static float weight_of(const SimDefinition* d, int strand, int node)
@@ -188,13 +212,15 @@ static void fill_shares(Block* block, const SimDefinition* d, int strand, int la
 }
 
 // K of joint n over the mass of a node: k/m d^2, d from the middle of one link to that of the next.
-// A clamped root has half a link to bend, so it is twice as stiff (notes/simulation.md 1).
+// A clamped root has half a link to bend, so it is twice as stiff (notes/simulation.md 1); as
+// printed the forest knows no clamp.
 static void fill_hinge(Block* block, const SimDefinition* d, const Vec3* rest, int lane, int n)
 {
     double k = (double)model_stiffness(d, reach_of(rest, n - 1));
     double length = (double)vec3_length(link_of(rest, n));
     if (n > 1) length = 0.5 * (length + (double)vec3_length(link_of(rest, n - 1)));
-    block->hinge[n].v[lane] = (real)((n == 1 ? 2.0 : 1.0) * k * length * length);
+    double clamp = n == 1 && d->model != MODEL_FOREST_Z ? 2.0 : 1.0;
+    block->hinge[n].v[lane] = (real)(clamp * k * length * length);
 }
 
 // What sim_tune may change.
@@ -281,6 +307,7 @@ static void fill_block(Block* block, const SimDefinition* d, int first)
             fill_node(block, d, strand, lane, n);
         fill_tuned(block, d, d->rest + (size_t)strand * (size_t)d->nodes, lane);
         fill_frames(block, d, strand, lane);
+        printed_fill(block, d, strand, lane);
     }
 }
 
@@ -288,7 +315,7 @@ static void fill_substeps(Sim* sim)
 {
     const SimDefinition* d = &sim->definition;
     double dt = 1.0 / (d->rate_hz * d->substeps);
-    bool compensated = d->gravity_compensation && d->model == MODEL_SPRING;
+    bool compensated = d->gravity_compensation && models[d->model].drops_gravity;
     float gravity = d->gravity_m_s2 - (compensated ? sim->gravity_at_rest : 0.0f);
     for (int s = 0; s < d->substeps; ++s)
         sim->substeps[s] =
@@ -296,6 +323,7 @@ static void fill_substeps(Sim* sim)
                       .dt2 = (float)(dt * dt),
                       .model = (int)d->model,
                       .outermost = d->outermost,
+                      .down_share = d->down_share,
                       .velocity_kept = (float)trig_exp(-(double)d->damping_per_s * dt),
                       .gravity_m_s2 = gravity,
                       .iterations = d->iterations,
@@ -409,6 +437,8 @@ void sim_reset(Sim* sim, const float rotation[9])
         size_t bytes = (size_t)block->nodes * sizeof(Lanes3);
         memcpy(block->position, block->reference, bytes);
         memcpy(block->previous, block->reference, bytes);
+        memset(block->angle, 0, (size_t)block->nodes * sizeof(Angles));
+        memset(block->rate, 0, (size_t)block->nodes * sizeof(Angles));
     }
 }
 
@@ -471,6 +501,14 @@ int64_t sim_quarantined(const Sim* sim)
     return sum;
 }
 
+static void hash_angles(const Block* block, int n, int lane, void* hash_state)
+{
+    const Angles *angle = &block->angle[n], *rate = &block->rate[n];
+    float state[4] = {(float)angle->theta[lane], (float)angle->phi[lane], (float)rate->theta[lane],
+                      (float)rate->phi[lane]};
+    XXH64_update(hash_state, state, sizeof state);
+}
+
 void sim_hash(const Sim* sim, void* hash_state)
 {
     int nodes = sim->definition.nodes;
@@ -479,5 +517,7 @@ void sim_hash(const Sim* sim, void* hash_state)
         Vec3 node[2] = {lane_get(&block->position[i % nodes], i / nodes % LANES),
                         lane_get(&block->previous[i % nodes], i / nodes % LANES)};
         XXH64_update(hash_state, node, sizeof node);
+        if (models[sim->definition.model].has_angles)
+            hash_angles(block, i % nodes, i / nodes % LANES, hash_state);
     }
 }

@@ -21,6 +21,8 @@ typedef enum ModelKind {
     MODEL_CASCADE,
     MODEL_FOREST,
     MODEL_PLAIN,
+    MODEL_CASCADE_THESIS, // as printed, kept for its failures; so is the next
+    MODEL_FOREST_Z,
     MODEL_COUNT
 } ModelKind;
 
@@ -39,15 +41,18 @@ typedef struct SimDefinition {
     int iterations;     // length-correction sweeps a substep
     float gravity_m_s2; // along -Y
     // k/m, 1/s^2: of the first node's spring to its rest place (spring), or across the first joint,
-    // EI / (m d^3) (cascade, forest).
+    // EI / (m d^3) (the others).
     float stiffness_s2;
     float fall_off_per_m; // c in k(L) = k / max(1, c L)^a, L m from the root (thesis 5.9, mended)
     int fall_off_power;   // a: 0 none, 1 linear, 2 quadratic, 3 cubic
-    float damping_per_s;  // velocity relative to the head decays as exp(-damping t)
-    float drag_per_s;     // where a wind blows, velocity relative to it decays as exp(-drag t)
-    float pearl_radius_m; // every node collides as a sphere of this radius (Nalu 23.2.2)
-    // Rest is equilibrium under gravity: at every tilt (spring), untilted (cascade, forest: the
-    // joints carry the weight), not at all (plain).
+    // Velocity relative to the head decays as exp(-damping t); forest-z has its joints' alone.
+    float damping_per_s;
+    float drag_per_s;          // where a wind blows, velocity relative to it decays as exp(-drag t)
+    float joint_damping_per_s; // forest-z: v/J of a joint, J = m d^2 (thesis 4.2.2)
+    float down_share;          // cascade-thesis: the downward springs' part of the upward ones' k
+    float pearl_radius_m;      // every node collides as a sphere of this radius (Nalu 23.2.2)
+    // Rest is equilibrium under gravity: at every tilt (spring, cascade-thesis, forest-z: gravity
+    // is left out), untilted (cascade, forest: the joints carry the weight), not at all (plain).
     bool gravity_compensation;
     float tip_mass; // of the last node, in masses of the others: 1, or a half
     bool outermost; // forest: the head's acceleration acts on the tips alone
@@ -100,6 +105,7 @@ void sim_state(const Sim* sim, Vec3* positions, Vec3* previous);
 // finite or 1 km away. The other strands are not touched.
 int64_t sim_quarantined(const Sim* sim);
 
-// Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position then
-// previous position; padding lanes left out. `hash_state` is an XXH64_state_t*.
+// Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position,
+// previous position, then what other state the model has; padding lanes left out. `hash_state` is
+// an XXH64_state_t*.
 void sim_hash(const Sim* sim, void* hash_state);

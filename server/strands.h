@@ -42,6 +42,11 @@ typedef struct Lanes3 {
     real x[LANES], y[LANES], z[LANES];
 } Lanes3;
 
+// Of a joint: theta about the z axis of the link before, phi about the link's own y axis.
+typedef struct Angles {
+    real theta[LANES], phi[LANES];
+} Angles;
+
 // Thirty-two strands. Every array has one entry per node; what belongs to link n, from node n - 1
 // to n, stands at n, and entry 0 is unused.
 struct Block {
@@ -51,6 +56,8 @@ struct Block {
     // State: world axes, relative to the head's position, m.
     Lanes3* position;
     Lanes3* previous; // one substep ago
+    Angles* angle;    // forest-z: of joint n from rest, and how fast it turns, 1/s
+    Angles* rate;
     // Within a substep.
     Lanes3* reference;    // where rest is now
     Lanes3* acceleration; // m/s^2; of a link's direction, 1/s^2, in the forest models
@@ -70,6 +77,11 @@ struct Block {
     Lanes* outer_part; // of a link's error corrected at node n
     Lanes* inner_part; // ... and at node n - 1
     Lanes* clearance;  // [collider][node]: least distance to the centre, m
+    // Of the printed models alone; forest-z has its y and x axes in predicted and moment.
+    Lanes3* upward;     // cascade-thesis: node n at rest in the space of link n - 1, m (printed.c)
+    Lanes3* downward;   // ... and in that of link n + 2
+    Angles* rest_angle; // forest-z: of joint n at rest
+    Lanes* friction;    // forest-z: v of joint n over the mass of a node, m^2/s
 };
 
 // What one substep needs besides the block.
@@ -84,7 +96,8 @@ struct Substep {
     Vec3 air_move;          // of the air past the head, m
     int model;              // ModelKind
     int iterations;
-    bool outermost; // forest: the head's acceleration acts on the tips alone
+    bool outermost;   // forest: the head's acceleration acts on the tips alone
+    float down_share; // cascade-thesis
     int collider_count;
     const Vec3* centre;      // of each collider now, world axes
     const Vec3* centre_move; // since the substep before

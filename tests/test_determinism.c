@@ -109,7 +109,14 @@ static void own_functions_agree_with_libm(void** state)
         assert_true(fabs(trig_cos(x) - cos(x)) < 1e-12);
         assert_true(fabs(trig_exp(x) / exp(x) - 1.0) < 1e-11);
         assert_true(fabs(trig_log(x + 20.001) - log(x + 20.001)) < 1e-12);
+        assert_true(fabs(trig_atan(x) - atan(x)) < 1e-12);
+        for (double y = -20.0; y < 20.0; y += 0.37)
+            assert_true(fabs(trig_atan2(y, x) - atan2(y, x)) < 1e-12);
     }
+    static const double axes[] = {-1.0, 0.0, 1.0};
+    for (int i = 0; i < 9; ++i)
+        assert_true(fabs(trig_atan2(axes[i / 3], axes[i % 3]) - atan2(axes[i / 3], axes[i % 3])) <
+                    1e-12);
 }
 
 int main(void)
