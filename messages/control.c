@@ -7,6 +7,8 @@
 #include <hair_pose_t.h>
 #include <hair_request_t.h>
 #include <hair_status_t.h>
+#include <hair_tuning_t.h>
+#include <hair_wind_t.h>
 
 // Fields are put and taken by hand, in the order of the .lcm files, rather than by lcm-gen's code:
 // that caches each fingerprint in a variable without a lock, and these run in several threads.
@@ -14,8 +16,10 @@
 enum {
     POSE_BYTES = 79,
     CHARACTER_BYTES = 51,
+    WIND_BYTES = 40,
+    TUNING_BYTES = 45,
     REQUEST_BYTES = 27 + STYLE_MAX_PARTS / 8,
-    STATUS_BYTES = 84,
+    STATUS_BYTES = 100,
     APPLIED_HEADER_BYTES = 52,
 };
 
@@ -135,6 +139,21 @@ static bool check_slot(const char* type, int slot, Fault* fault)
            fault_set(fault, "%s: slot %d: 0 to %d", type, slot, CHANNEL_MAX_SLOTS - 1);
 }
 
+static bool check_slots(const char* type, int first, int count, Fault* fault)
+{
+    return (count >= 1 && first + count <= CHANNEL_MAX_SLOTS) ||
+           fault_set(fault, "%s: slots %d and %d on: 1 to %d of them, below %d", type, first, count,
+                     CHANNEL_MAX_SLOTS, CHANNEL_MAX_SLOTS);
+}
+
+// False also where `value` is no number.
+static bool check_range(const char* type, const char* field, double value, double low, double high,
+                        Fault* fault)
+{
+    return (value >= low && value <= high) ||
+           fault_set(fault, "%s: %s is %g: %g to %g", type, field, value, low, high);
+}
+
 static bool check_time(const char* type, const char* field, int64_t value, Fault* fault)
 {
     return value >= 0 || fault_set(fault, "%s: %s is negative", type, field);
@@ -238,6 +257,106 @@ bool character_decode(CharacterMessage* message, const uint8_t* bytes, size_t si
     return true;
 }
 
+// Wind ------------------------------------------------------------------------------------------
+
+static bool check_wind(const WindMessage* m, Fault* fault)
+{
+    return check_time("wind", "utime", m->utime, fault) &&
+           check_slots("wind", m->first_slot, m->slot_count, fault) &&
+           check_range("wind", "velocity", (double)m->velocity.x, -200, 200, fault) &&
+           check_range("wind", "velocity", (double)m->velocity.y, -200, 200, fault) &&
+           check_range("wind", "velocity", (double)m->velocity.z, -200, 200, fault) &&
+           check_range("wind", "gust", (double)m->gust, 0, 4, fault) &&
+           check_range("wind", "gust_hz", (double)m->gust_hz, 0, 100, fault);
+}
+
+size_t wind_encode(uint8_t* bytes, size_t capacity, const WindMessage* message)
+{
+    if (capacity < WIND_BYTES || !check_wind(message, NULL)) return 0;
+    put64(&bytes, __hair_wind_t_hash_recursive(NULL));
+    put64(&bytes, (uint64_t)message->utime);
+    put16(&bytes, message->first_slot);
+    put16(&bytes, message->slot_count);
+    put_float(&bytes, message->velocity.x);
+    put_float(&bytes, message->velocity.y);
+    put_float(&bytes, message->velocity.z);
+    put_float(&bytes, message->gust);
+    put_float(&bytes, message->gust_hz);
+    return WIND_BYTES;
+}
+
+bool wind_decode(WindMessage* message, const uint8_t* bytes, size_t size, Fault* fault)
+{
+    uint64_t type = __hair_wind_t_hash_recursive(NULL);
+    if (!take_start(&bytes, "wind", size, WIND_BYTES, type, fault)) return false;
+    WindMessage m;
+    m.utime = (int64_t)take64(&bytes);
+    m.first_slot = take16(&bytes);
+    m.slot_count = take16(&bytes);
+    m.velocity.x = take_float(&bytes);
+    m.velocity.y = take_float(&bytes);
+    m.velocity.z = take_float(&bytes);
+    m.gust = take_float(&bytes);
+    m.gust_hz = take_float(&bytes);
+    if (!check_wind(&m, fault)) return false;
+    *message = m;
+    return true;
+}
+
+// Tuning ----------------------------------------------------------------------------------------
+
+static bool check_tuning(const TuningMessage* m, Fault* fault)
+{
+    if (m->set == 0 || m->set > TUNING_EVERY)
+        return fault_set(fault, "tuning: set is %d: bits for 1 to 6 fields, 1 to %d", m->set,
+                         TUNING_EVERY);
+    return check_time("tuning", "utime", m->utime, fault) &&
+           check_slots("tuning", m->first_slot, m->slot_count, fault) &&
+           check_range("tuning", "stiffness_s2", (double)m->stiffness_s2, 0, 1e6, fault) &&
+           check_range("tuning", "damping_per_s", (double)m->damping_per_s, 0, 1e4, fault) &&
+           check_range("tuning", "gravity_m_s2", (double)m->gravity_m_s2, -1000, 1000, fault) &&
+           check_range("tuning", "drag_per_s", (double)m->drag_per_s, 0, 1e4, fault) &&
+           check_range("tuning", "iterations", m->iterations, 0, 64, fault) &&
+           check_range("tuning", "pearl_radius_m", (double)m->pearl_radius_m, 0, 1, fault);
+}
+
+size_t tuning_encode(uint8_t* bytes, size_t capacity, const TuningMessage* message)
+{
+    if (capacity < TUNING_BYTES || !check_tuning(message, NULL)) return 0;
+    put64(&bytes, __hair_tuning_t_hash_recursive(NULL));
+    put64(&bytes, (uint64_t)message->utime);
+    put16(&bytes, message->first_slot);
+    put16(&bytes, message->slot_count);
+    put8(&bytes, message->set);
+    put_float(&bytes, message->stiffness_s2);
+    put_float(&bytes, message->damping_per_s);
+    put_float(&bytes, message->gravity_m_s2);
+    put_float(&bytes, message->drag_per_s);
+    put32(&bytes, (uint32_t)message->iterations);
+    put_float(&bytes, message->pearl_radius_m);
+    return TUNING_BYTES;
+}
+
+bool tuning_decode(TuningMessage* message, const uint8_t* bytes, size_t size, Fault* fault)
+{
+    uint64_t type = __hair_tuning_t_hash_recursive(NULL);
+    if (!take_start(&bytes, "tuning", size, TUNING_BYTES, type, fault)) return false;
+    TuningMessage m;
+    m.utime = (int64_t)take64(&bytes);
+    m.first_slot = take16(&bytes);
+    m.slot_count = take16(&bytes);
+    m.set = take8(&bytes);
+    m.stiffness_s2 = take_float(&bytes);
+    m.damping_per_s = take_float(&bytes);
+    m.gravity_m_s2 = take_float(&bytes);
+    m.drag_per_s = take_float(&bytes);
+    m.iterations = (int32_t)take32(&bytes);
+    m.pearl_radius_m = take_float(&bytes);
+    if (!check_tuning(&m, fault)) return false;
+    *message = m;
+    return true;
+}
+
 // Request ---------------------------------------------------------------------------------------
 
 static bool check_request(const RequestMessage* m, Fault* fault)
@@ -291,7 +410,7 @@ static bool check_status(const StatusMessage* m, Fault* fault)
     if (m->characters < 0 || m->characters > CHANNEL_MAX_SLOTS)
         return fault_set(fault, "status: %d characters: 0 to %d", m->characters, CHANNEL_MAX_SLOTS);
     if (m->strands < 0 || m->overruns < 0 || m->clamped < 0 || m->rejected < 0 ||
-        m->sent_messages < 0 || m->sent_bytes < 0)
+        m->sent_messages < 0 || m->sent_bytes < 0 || m->quarantined < 0 || m->jumps < 0)
         return fault_set(fault, "status: a count is negative");
     return true;
 }
@@ -312,6 +431,8 @@ size_t status_encode(uint8_t* bytes, size_t capacity, const StatusMessage* messa
     put64(&bytes, (uint64_t)message->rejected);
     put64(&bytes, (uint64_t)message->sent_messages);
     put64(&bytes, (uint64_t)message->sent_bytes);
+    put64(&bytes, (uint64_t)message->quarantined);
+    put64(&bytes, (uint64_t)message->jumps);
     return STATUS_BYTES;
 }
 
@@ -332,6 +453,8 @@ bool status_decode(StatusMessage* message, const uint8_t* bytes, size_t size, Fa
     m.rejected = (int64_t)take64(&bytes);
     m.sent_messages = (int64_t)take64(&bytes);
     m.sent_bytes = (int64_t)take64(&bytes);
+    m.quarantined = (int64_t)take64(&bytes);
+    m.jumps = (int64_t)take64(&bytes);
     if (!check_status(&m, fault)) return false;
     *message = m;
     return true;

@@ -30,10 +30,33 @@ static inline double trig_cos(double x)
     return trig_sin(x + 0.5 * TRIG_PI);
 }
 
-// exp(x) for |x| < 700: halved ten times, Taylor to x^12, squared back.
+// atan(x) for any x: halved twice below tan(pi/16), then the series to x^17.
+static inline double trig_atan(double x)
+{
+    double t = fabs(x) > 1.0 ? 1.0 / x : x;
+    for (int i = 0; i < 2; ++i)
+        t = t / (1.0 + sqrt(1.0 + t * t));
+    double s = t * t, sum = 0.0;
+    for (int i = 17; i >= 1; i -= 2)
+        sum = 1.0 / i - s * sum;
+    sum *= 4.0 * t;
+    if (fabs(x) <= 1.0) return sum;
+    return (x > 0.0 ? 0.5 : -0.5) * TRIG_PI - sum;
+}
+
+// The angle of (x, y) from the x axis, -pi to pi; 0 for (0, 0).
+static inline double trig_atan2(double y, double x)
+{
+    if (x == 0.0 && y == 0.0) return 0.0;
+    if (fabs(y) > fabs(x)) return (y > 0.0 ? 0.5 : -0.5) * TRIG_PI - trig_atan(x / y);
+    return trig_atan(y / x) + (x > 0.0 ? 0.0 : y >= 0.0 ? TRIG_PI : -TRIG_PI);
+}
+
+// exp(x) for x < 700, 0 below -700: halved ten times, Taylor to x^12, squared back.
 static inline double trig_exp(double x)
 {
     double r = x / 1024.0, sum = 1.0;
+    if (x < -700.0) return 0.0;
     for (int i = 12; i >= 1; --i)
         sum = 1.0 + r * sum / i;
     for (int i = 0; i < 10; ++i)

@@ -123,6 +123,12 @@ static inline Vec3d vec3d_scale(Vec3d a, double s)
     return (Vec3d){a.x * s, a.y * s, a.z * s};
 }
 
+// a + b * s
+static inline Vec3d vec3d_mad(Vec3d a, Vec3d b, double s)
+{
+    return vec3d_add(a, vec3d_scale(b, s));
+}
+
 static inline double vec3d_dot(Vec3d a, Vec3d b)
 {
     return a.x * b.x + a.y * b.y + a.z * b.z;

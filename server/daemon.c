@@ -1,6 +1,7 @@
 #include "server/daemon.h"
 
 #include "messages/channels.h"
+#include "messages/trig.h"
 #include "server/inputs.h"
 #include "server/motion.h"
 #include "server/poses.h"
@@ -22,6 +23,9 @@
 #define COMPLAINTS(X)                                                                              \
     X(POSE)                                                                                        \
     X(CHARACTER)                                                                                   \
+    X(WIND)                                                                                        \
+    X(TUNING)                                                                                      \
+    X(UNSTABLE)                                                                                    \
     X(REQUEST)                                                                                     \
     X(STATUS)                                                                                      \
     X(CHANNEL)                                                                                     \
@@ -29,7 +33,9 @@
     X(OVERFLOW)                                                                                    \
     X(STYLE)                                                                                       \
     X(EMPTY_SLOT)                                                                                  \
-    X(POSE_IN_CODE)
+    X(POSE_IN_CODE)                                                                                \
+    X(QUARANTINE)                                                                                  \
+    X(JUMP)
 
 typedef enum Complaint {
 #define COMPLAINT_ENUM(name) COMPLAINT_##name,
@@ -52,12 +58,14 @@ typedef struct Slot {
     PoseRing poses;
     Pose head;  // at the end of the last substep
     Vec3d move; // of the head in the last substep, m
+    WindMessage wind;
     int motion_segment;
     int32_t segment; // as published
     bool frozen;
     Quat frozen_orientation; // the hair's state stays as it was under this one
     int64_t clamped;
-    SimHead* heads; // of one tick
+    int64_t quarantined; // of its strands, as counted below
+    SimHead* heads;      // of one tick
     PublishPlanes planes;
 } Slot;
 
@@ -83,7 +91,7 @@ struct Daemon {
     int64_t since_status_us;
     int64_t step_us, step_count;
     double mean_step_us;
-    int64_t overruns, rejected;
+    int64_t overruns, rejected, quarantined, jumps;
     bool complained[COMPLAINT_COUNT];
 };
 
@@ -374,22 +382,42 @@ static void queue_input(Daemon* daemon, Input* input, const uint8_t* bytes, size
         complain(daemon, COMPLAINT_OVERFLOW, "more inputs in one tick than the queue holds");
 }
 
+static bool decode_input(Input* input, const uint8_t* bytes, size_t size, Fault* fault)
+{
+    switch (input->kind) {
+    case INPUT_POSE:
+        return pose_decode(&input->pose, bytes, size, fault);
+    case INPUT_CHARACTER:
+        return character_decode(&input->character, bytes, size, fault);
+    case INPUT_WIND:
+        return wind_decode(&input->wind, bytes, size, fault);
+    default:
+        return tuning_decode(&input->tuning, bytes, size, fault);
+    }
+}
+
+// What waits for the tick boundary.
+static const struct {
+    const char* channel;
+    Complaint complaint;
+} input_table[INPUT_KINDS] = {
+    [INPUT_POSE] = {CHANNEL_POSE, COMPLAINT_POSE},
+    [INPUT_CHARACTER] = {CHANNEL_CHARACTER, COMPLAINT_CHARACTER},
+    [INPUT_WIND] = {CHANNEL_WIND, COMPLAINT_WIND},
+    [INPUT_TUNING] = {CHANNEL_TUNING, COMPLAINT_TUNING},
+};
+
 void daemon_receive(Daemon* daemon, const char* channel, const uint8_t* bytes, size_t size)
 {
-    Input input;
+    Input input = {.kind = INPUT_POSE};
     Fault fault;
-    if (strcmp(channel, CHANNEL_POSE) == 0) {
-        input.kind = INPUT_POSE;
-        if (pose_decode(&input.pose, bytes, size, &fault))
+    while (input.kind < INPUT_KINDS && strcmp(channel, input_table[input.kind].channel) != 0)
+        ++input.kind;
+    if (input.kind < INPUT_KINDS) {
+        if (decode_input(&input, bytes, size, &fault))
             queue_input(daemon, &input, bytes, size);
         else
-            complain(daemon, COMPLAINT_POSE, fault.text);
-    } else if (strcmp(channel, CHANNEL_CHARACTER) == 0) {
-        input.kind = INPUT_CHARACTER;
-        if (character_decode(&input.character, bytes, size, &fault))
-            queue_input(daemon, &input, bytes, size);
-        else
-            complain(daemon, COMPLAINT_CHARACTER, fault.text);
+            complain(daemon, input_table[input.kind].complaint, fault.text);
     } else if (strcmp(channel, CHANNEL_REQUEST) == 0) {
         receive_request(daemon, bytes, size);
     } else if (strcmp(channel, CHANNEL_STATUS) == 0) {
@@ -449,6 +477,18 @@ static void apply_character(Daemon* daemon, const CharacterMessage* message)
         complain(daemon, COMPLAINT_CHARACTER, fault.text);
 }
 
+static void push_pose(Daemon* daemon, Slot* slot, const PoseMessage* message)
+{
+    char text[160];
+    if (!poses_push(&slot->poses, message, time_of(daemon, daemon->steps, 0))) return;
+    ++daemon->jumps;
+    snprintf(text, sizeof text,
+             "the head of character %d jumped without raising its segment: taken as a carry; raise "
+             "the segment of " CHANNEL_POSE " at a teleport",
+             slot->number);
+    remark(daemon, COMPLAINT_JUMP, text);
+}
+
 static void apply_pose(Daemon* daemon, const PoseMessage* message)
 {
     Slot* slot = daemon->slots[message->slot];
@@ -460,7 +500,64 @@ static void apply_pose(Daemon* daemon, const PoseMessage* message)
         complain(daemon, COMPLAINT_POSE_IN_CODE,
                  "a pose for a character that moves by itself; start with --motion bus");
     else
-        poses_push(&slot->poses, message, time_of(daemon, daemon->steps, 0));
+        push_pose(daemon, slot, message);
+}
+
+static bool is_among(const Slot* slot, int first, int count)
+{
+    return slot->number >= first && slot->number < first + count;
+}
+
+static void apply_wind(Daemon* daemon, const WindMessage* message)
+{
+    for (int i = 0; i < daemon->used; ++i) {
+        Slot* slot = daemon->slots[daemon->order[i]];
+        if (is_among(slot, message->first_slot, message->slot_count)) slot->wind = *message;
+    }
+}
+
+static bool tune_slot(Slot* slot, const TuningMessage* message, Fault* fault)
+{
+    SimDefinition wanted = *sim_definition(slot->sim);
+    if (message->set & TUNING_STIFFNESS) wanted.stiffness_s2 = message->stiffness_s2;
+    if (message->set & TUNING_DAMPING) wanted.damping_per_s = message->damping_per_s;
+    if (message->set & TUNING_GRAVITY) wanted.gravity_m_s2 = message->gravity_m_s2;
+    if (message->set & TUNING_DRAG) wanted.drag_per_s = message->drag_per_s;
+    if (message->set & TUNING_ITERATIONS) wanted.iterations = message->iterations;
+    if (message->set & TUNING_PEARL_RADIUS) wanted.pearl_radius_m = message->pearl_radius_m;
+    return sim_tune(slot->sim, &wanted, fault);
+}
+
+// Each character by itself: what one is stable with may be too much for another's damping.
+static void apply_tuning(Daemon* daemon, const TuningMessage* message)
+{
+    Fault fault;
+    bool taken = true;
+    for (int i = 0; i < daemon->used; ++i) {
+        Slot* slot = daemon->slots[daemon->order[i]];
+        if (is_among(slot, message->first_slot, message->slot_count))
+            taken = tune_slot(slot, message, &fault) && taken;
+    }
+    if (taken) return;
+    fault_prefix(&fault, CHANNEL_TUNING);
+    complain(daemon, COMPLAINT_UNSTABLE, fault.text);
+}
+
+static void apply_input(Daemon* daemon, const Input* input)
+{
+    switch (input->kind) {
+    case INPUT_POSE:
+        apply_pose(daemon, &input->pose);
+        break;
+    case INPUT_CHARACTER:
+        apply_character(daemon, &input->character);
+        break;
+    case INPUT_WIND:
+        apply_wind(daemon, &input->wind);
+        break;
+    default:
+        apply_tuning(daemon, &input->tuning);
+    }
 }
 
 static void publish_applied(Daemon* daemon, const Input* input)
@@ -471,7 +568,7 @@ static void publish_applied(Daemon* daemon, const Input* input)
                               .tick = (int32_t)(daemon->steps - daemon->first_step),
                               .size = (int32_t)input->size,
                               .payload = input->bytes};
-    strcpy(message.channel, input->kind == INPUT_POSE ? CHANNEL_POSE : CHANNEL_CHARACTER);
+    strcpy(message.channel, input_table[input->kind].channel);
     publish_bytes(&daemon->publisher, daemon->utime, CHANNEL_APPLIED, bytes,
                   applied_encode(bytes, sizeof bytes, &message));
 }
@@ -480,10 +577,7 @@ static void consume_inputs(Daemon* daemon)
 {
     for (int i = 0; i < daemon->inputs.count; ++i) {
         const Input* input = &daemon->inputs.queue[i];
-        if (input->kind == INPUT_POSE)
-            apply_pose(daemon, &input->pose);
-        else
-            apply_character(daemon, &input->character);
+        apply_input(daemon, input);
         publish_applied(daemon, input);
     }
     daemon->inputs.count = 0;
@@ -530,9 +624,16 @@ static void follow_freeze(Slot* slot)
     sim_turn(slot->sim, m);
 }
 
+static Vec3d wind_at(const WindMessage* wind, double t)
+{
+    double turns = (double)wind->gust_hz * t;
+    double swing = trig_sin(2.0 * TRIG_PI * (turns - floor(turns)));
+    return vec3d_scale(vec3d_from(wind->velocity), 1.0 + (double)wind->gust * swing);
+}
+
 static void move_head(Slot* slot, SimHead* head, double t)
 {
-    MotionState state = {.segment = slot->motion_segment};
+    MotionState state = {.segment = slot->motion_segment}; // the bus brings none of it
     Pose next = path_at(slot, t, &state);
     Vec3d move = vec3d_sub(next.position, slot->head.position), change = {0, 0, 0};
     if (state.segment == slot->motion_segment) {
@@ -545,6 +646,8 @@ static void move_head(Slot* slot, SimHead* head, double t)
     slot->head = next;
     quat_matrix(head->rotation, next.orientation);
     head->second_difference = vec3_from(change);
+    head->move = vec3_from(slot->move);
+    head->wind = vec3_from(vec3d_add(state.wind, wind_at(&slot->wind, t)));
 }
 
 static void step_slot(Daemon* daemon, Slot* slot)
@@ -573,6 +676,24 @@ static void step_slots(Daemon* daemon)
 #pragma omp parallel for num_threads(threads) schedule(dynamic)
     for (int i = 0; i < used; ++i)
         step_slot(daemon, daemon->slots[daemon->order[i]]);
+}
+
+// Here rather than where it is stepped: characters are stepped side by side.
+static void count_quarantined(Daemon* daemon)
+{
+    char text[160];
+    for (int i = 0; i < daemon->used; ++i) {
+        Slot* slot = daemon->slots[daemon->order[i]];
+        int64_t count = sim_quarantined(slot->sim);
+        if (count == slot->quarantined) continue;
+        daemon->quarantined += count - slot->quarantined;
+        slot->quarantined = count;
+        snprintf(text, sizeof text,
+                 "strands of character %d were not finite or 1 km from the head and are back at "
+                 "rest; lower the stiffness or raise the substeps",
+                 slot->number);
+        remark(daemon, COMPLAINT_QUARANTINE, text);
+    }
 }
 
 static void begin_epoch(Daemon* daemon, int64_t epoch)
@@ -620,6 +741,7 @@ void daemon_tick(Daemon* daemon)
             : base_wall_us();
     consume_inputs(daemon);
     step_slots(daemon);
+    count_quarantined(daemon);
     ++daemon->steps;
     count_step(daemon, base_monotonic_us() - start);
 }
@@ -686,7 +808,9 @@ static void publish_status(Daemon* daemon)
                              .clamped = status.clamped,
                              .rejected = status.rejected,
                              .sent_messages = status.sent_messages,
-                             .sent_bytes = status.sent_bytes};
+                             .sent_bytes = status.sent_bytes,
+                             .quarantined = status.quarantined,
+                             .jumps = status.jumps};
     uint8_t bytes[CONTROL_MAX_BYTES];
     publish_bytes(&daemon->publisher, daemon->utime, CHANNEL_STATUS, bytes,
                   status_encode(bytes, sizeof bytes, &message));
@@ -768,7 +892,9 @@ DaemonStatus daemon_status(const Daemon* daemon)
                            .overruns = daemon->overruns,
                            .rejected = daemon->rejected,
                            .sent_messages = daemon->publisher.sent_messages,
-                           .sent_bytes = daemon->publisher.sent_bytes};
+                           .sent_bytes = daemon->publisher.sent_bytes,
+                           .quarantined = daemon->quarantined,
+                           .jumps = daemon->jumps};
     for (int i = 0; i < daemon->used; ++i) {
         const Slot* slot = daemon->slots[daemon->order[i]];
         status.strands += daemon->styles[slot->style].hair->guide_count;

@@ -75,6 +75,8 @@ typedef struct DaemonStatus {
     int guides, nodes; // of the first style
     double step_us;    // mean of a tick over the last second
     int64_t overruns, rejected, clamped, sent_messages, sent_bytes;
+    int64_t quarantined; // strands put back to rest since the start
+    int64_t jumps;       // of heads that did not raise their segment
 } DaemonStatus;
 
 DaemonStatus daemon_status(const Daemon* daemon);

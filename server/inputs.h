@@ -4,15 +4,23 @@
 #include "messages/control.h"
 
 #define INPUTS_MAX       256
-#define INPUTS_MAX_BYTES 256 // of a queued message; poses and characters are smaller
+#define INPUTS_MAX_BYTES 256 // of a queued message; inputs are smaller
 
-typedef enum InputKind { INPUT_POSE, INPUT_CHARACTER } InputKind;
+typedef enum InputKind {
+    INPUT_POSE,
+    INPUT_CHARACTER,
+    INPUT_WIND,
+    INPUT_TUNING,
+    INPUT_KINDS
+} InputKind;
 
 typedef struct Input {
     InputKind kind;
     union {
         PoseMessage pose;
         CharacterMessage character;
+        WindMessage wind;
+        TuningMessage tuning;
     };
     size_t size;
     uint8_t bytes[INPUTS_MAX_BYTES]; // as they came: what applied_t repeats

@@ -16,6 +16,10 @@
 #define RESTART_S         1.0
 #define LEAST_STEP_S      1e-4 // between samples
 #define MOST_EXTRAPOLATED 4.0  // intervals, when a carry is compared with where the head would be
+#define JUMP_M            0.5  // poses.h
+#define JUMP_RAD          1.5707963
+#define JUMP_M_S          10.0
+#define JUMP_RAD_S        20.0
 
 static double glide_at(const PoseGlide* glide, double t)
 {
@@ -70,6 +74,15 @@ static void append(PoseRing* ring, double time_s, Pose pose)
     ring->ring[ring->count++] = (PoseSample){time_s, pose};
 }
 
+// Where two poses lead, `steps` of their distance beyond the second.
+static Pose lead_on(const Pose* before, const Pose* last, double steps)
+{
+    steps = fmin(fmax(steps, 0.0), MOST_EXTRAPOLATED);
+    Vec3d move = vec3d_sub(last->position, before->position);
+    Quat q = quat_toward(before->orientation, last->orientation, 1.0 + steps);
+    return (Pose){vec3d_add(last->position, vec3d_scale(move, steps)), quat_normalise(q)};
+}
+
 // Where the head would be at `time_s`, had it not been carried off.
 static Pose expected(const PoseRing* ring, double time_s)
 {
@@ -77,10 +90,41 @@ static Pose expected(const PoseRing* ring, double time_s)
     if (ring->count < 2) return last->pose;
     const PoseSample* before = last - 1;
     double steps = (time_s - last->time_s) / (last->time_s - before->time_s);
-    steps = fmin(fmax(steps, 0.0), MOST_EXTRAPOLATED);
-    Vec3d move = vec3d_sub(last->pose.position, before->pose.position);
-    Quat q = quat_toward(before->pose.orientation, last->pose.orientation, 1.0 + steps);
-    return (Pose){vec3d_add(last->pose.position, vec3d_scale(move, steps)), quat_normalise(q)};
+    return lead_on(&before->pose, &last->pose, steps);
+}
+
+static bool is_far(const Pose* a, const Pose* b, double metres, double radians)
+{
+    Vec3d way = vec3d_sub(a->position, b->position);
+    double cosine = fabs(quat_dot(a->orientation, b->orientation)); // of half the angle
+    return vec3d_dot(way, way) > metres * metres ||
+           (radians < TRIG_PI && cosine < trig_cos(0.5 * radians));
+}
+
+// A head at a steady 30 m/s is where its last two poses lead; one that stops dead is at the last.
+static bool is_jump(const PoseRing* ring, const PoseMessage* message, double now_s)
+{
+    if (ring->sent_count < 2 || message->segment != ring->segment) return false;
+    double apart = (double)(message->utime - ring->last_utime) * 1e-6;
+    if (!(apart > 0.0)) apart = now_s - ring->last_heard_s; // a sender that began anew
+    double beyond = fmax(apart - ring->interval_s, 0.0);
+    double metres = JUMP_M + JUMP_M_S * beyond, radians = JUMP_RAD + JUMP_RAD_S * beyond;
+    Pose led = lead_on(&ring->sent[0], &ring->sent[1], apart / ring->sent_apart_s);
+    return is_far(&message->pose, &ring->sent[1], metres, radians) &&
+           is_far(&message->pose, &led, metres, radians);
+}
+
+static void remember_sent(PoseRing* ring, const PoseMessage* message)
+{
+    bool begins = !ring->any || message->segment != ring->segment;
+    ring->sent[0] = ring->sent[1];
+    ring->sent[1] = message->pose;
+    if (quat_dot(ring->sent[0].orientation, ring->sent[1].orientation) < 0.0) {
+        Quat q = message->pose.orientation;
+        ring->sent[1].orientation = (Quat){-q.x, -q.y, -q.z, -q.w};
+    }
+    ring->sent_count = begins ? 1 : 2;
+    ring->sent_apart_s = fmax((double)(message->utime - ring->last_utime) * 1e-6, LEAST_STEP_S);
 }
 
 // Moves the whole path rigidly, so that it leads to `to` instead of where it would have led.
@@ -102,6 +146,19 @@ static void carry(PoseRing* ring, Pose to, double time_s)
     ring->pending_is_turned = turned || (ring->pending && ring->pending_is_turned);
 }
 
+// Takes the path to `pose` by carry or reset, for the caller to do the same to the hair.
+static void take_to(PoseRing* ring, Pose pose, uint8_t verb, double time_s)
+{
+    if (ring->pending && ring->pending_verb == POSE_RESET) verb = POSE_RESET;
+    if (verb == POSE_CARRY) carry(ring, pose, time_s);
+    if (verb == POSE_RESET) {
+        ring->count = 1;
+        ring->ring[0] = (PoseSample){-1e9, pose};
+    }
+    ring->pending = true;
+    ring->pending_verb = verb;
+}
+
 static void enter_segment(PoseRing* ring, const PoseMessage* message, double time_s)
 {
     ring->segment = message->segment;
@@ -109,15 +166,7 @@ static void enter_segment(PoseRing* ring, const PoseMessage* message, double tim
     uint8_t verb = message->verb;
     if (!ring->any && verb == POSE_FOLLOW) verb = POSE_CARRY;
     if (verb == POSE_FREEZE) verb = POSE_CARRY;
-    if (verb == POSE_FOLLOW) return;
-    if (ring->pending && ring->pending_verb == POSE_RESET) verb = POSE_RESET;
-    if (verb == POSE_CARRY) carry(ring, message->pose, time_s);
-    if (verb == POSE_RESET) {
-        ring->count = 1;
-        ring->ring[0] = (PoseSample){-1e9, message->pose};
-    }
-    ring->pending = true;
-    ring->pending_verb = verb;
+    if (verb != POSE_FOLLOW) take_to(ring, message->pose, verb, time_s);
 }
 
 static void start_clock(PoseRing* ring, double lateness_s, double now_s)
@@ -190,21 +239,25 @@ static bool is_stale(const PoseRing* ring, const PoseMessage* message, double no
     return message->utime <= ring->last_utime && !restarted;
 }
 
-void poses_push(PoseRing* ring, const PoseMessage* message, double now_s)
+bool poses_push(PoseRing* ring, const PoseMessage* message, double now_s)
 {
-    if (is_stale(ring, message, now_s)) return;
+    if (is_stale(ring, message, now_s)) return false;
+    bool jumps = is_jump(ring, message, now_s);
+    remember_sent(ring, message);
     follow_clock(ring, message->utime, now_s);
     if (ring->any) follow_interval(ring, (double)(message->utime - ring->last_utime) * 1e-6);
     follow_source(ring, now_s);
     double head = read_head(ring, now_s);
     double time = fmax((double)message->utime * 1e-6 + ring->offset_s, head + LEAST_STEP_S);
     if (!ring->any || message->segment != ring->segment) enter_segment(ring, message, time);
+    if (jumps) take_to(ring, message->pose, POSE_CARRY, time);
     if (head > newest(ring)->time_s + LEAST_STEP_S) append(ring, head, newest(ring)->pose);
     append(ring, fmax(time, newest(ring)->time_s + LEAST_STEP_S), message->pose);
     ring->frozen = message->verb == POSE_FREEZE;
     ring->any = true;
     ring->last_utime = message->utime;
     ring->last_heard_s = now_s;
+    return jumps;
 }
 
 // A ramp max(0, x), averaged twice over `w`: 0 before -w, x after w, cubic pieces between.

@@ -38,7 +38,11 @@ typedef struct PoseRing {
     bool frozen;
     int64_t last_utime;  // of the newest message
     double last_heard_s; // when it was consumed
-    double tick_s;       // inputs are consumed this far apart
+    // The last two poses of the segment as they were sent: a jump is seen in these.
+    Pose sent[2];
+    int sent_count;
+    double sent_apart_s;
+    double tick_s; // inputs are consumed this far apart
     // Sender's clock to simulation time: the least lateness of two windows, approached slowly.
     double offset_s;
     double window_start_s;
@@ -59,7 +63,12 @@ void poses_init(PoseRing* ring, Pose start, double tick_s);
 // Takes a message consumed at simulation time `now_s`: the path has been read up to there. Messages
 // of a lower segment are ignored unless the sender's clock went back by more than a second or it
 // was silent for one (a restarted sender).
-void poses_push(PoseRing* ring, const PoseMessage* message, double now_s);
+//
+// True where the head has jumped within its segment, a teleport that the sender did not call one:
+// it is then carried. A jump is a pose 0.5 m or 90 degrees away both from the last and from where
+// the last two lead, and 10 m/s or 20 rad/s further for what is beyond one source interval, as
+// messages may have been lost. At 20 Hz a run makes 0.18 m and a flip 34 degrees of an interval.
+bool poses_push(PoseRing* ring, const PoseMessage* message, double now_s);
 
 // The pose at simulation time `t`. Continuous in position, velocity and acceleration within a
 // segment.

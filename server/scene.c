@@ -356,6 +356,10 @@ static const Member character_members[] = {
 static const Member simulation_members[] = {
     {"stiffness_s2", read_float, offsetof(SimDefinition, stiffness_s2), 0, 1e6, false},
     {"damping_per_s", read_float, offsetof(SimDefinition, damping_per_s), 0, 1e4, false},
+    {"drag_per_s", read_float, offsetof(SimDefinition, drag_per_s), 0, 1e4, false},
+    {"joint_damping_per_s", read_float, offsetof(SimDefinition, joint_damping_per_s), 0, 1e6,
+     false},
+    {"down_share", read_float, offsetof(SimDefinition, down_share), 0, 1, false},
     {"gravity_m_s2", read_float, offsetof(SimDefinition, gravity_m_s2), -1000, 1000, false},
     {"pearl_radius_m", read_float, offsetof(SimDefinition, pearl_radius_m), 0, 1, false},
     {"fall_off_per_m", read_float, offsetof(SimDefinition, fall_off_per_m), 0, 1e6, false},

@@ -4,7 +4,9 @@
 #include "messages/link.h"
 #include "messages/log.h"
 #include "server/daemon.h"
+#include "server/kernel.h"
 #include "server/load.h"
+#include "server/models.h"
 #include "server/motion.h"
 
 #include <argp.h>
@@ -46,11 +48,14 @@ enum {
     KEY_CHARACTERS,
     KEY_MOTION,
     KEY_MODEL,
+    KEY_KERNEL,
+    KEY_FORCE,
     KEY_RATE,
     KEY_SUBSTEPS,
     KEY_ITERATIONS,
     KEY_STIFFNESS,
     KEY_DAMPING,
+    KEY_DRAG,
     KEY_GRAVITY,
     KEY_THREADS,
     KEY_PROJECT,
@@ -81,15 +86,28 @@ static const struct argp_option option_table[] = {
     {"info", KEY_INFO, NULL, 0, "Print the loaded style and exit", 1},
     {NULL, 0, NULL, 0, "How it moves:", 2},
     {"motion", KEY_MOTION, "NAME", 0,
-     "none, bus (default), nod, shake, run, turn or teleport; bus obeys " CHANNEL_POSE, 2},
-    {"model", KEY_MODEL, "spring", 0, "Model of the strands", 2},
+     "none, bus (default), nod, shake, jump-stop, run, flip, turn, teleport or gust; bus "
+     "obeys " CHANNEL_POSE,
+     2},
+    {"model", KEY_MODEL, "NAME", 0,
+     "spring (default): nodes on springs to their rest places; cascade: sprung joints that push "
+     "back; forest: links that turn in sprung joints; plain: a chain that only hangs; as printed, "
+     "with their failures: cascade-thesis: sprung joints that nothing pushes back; forest-z: two "
+     "angles a joint, which lock",
+     2},
     {"rate", KEY_RATE, "HZ", 0, "Ticks a second (60)", 2},
     {"substeps", KEY_SUBSTEPS, "N", 0, "Steps of a tick (4)", 2},
     {"iterations", KEY_ITERATIONS, "N", 0, "Length corrections of a substep (1)", 2},
     {"stiffness", KEY_STIFFNESS, "S2", 0, "k/m at the root, 1/s^2 (1600); falls to the tip", 2},
     {"damping", KEY_DAMPING, "S", 0, "Decay of velocity relative to the head, 1/s (8)", 2},
+    {"drag", KEY_DRAG, "S", 0, "Decay of velocity relative to the air where a wind blows, 1/s (1)",
+     2},
     {"gravity", KEY_GRAVITY, "on|off", 0,
      "on: rest is where gravity pulls from; off (default): gravity is compensated at rest", 2},
+    {"force", KEY_FORCE, NULL, 0, "Take a stiffness beyond the bound of stability", 2},
+    {"kernel", KEY_KERNEL, "NAME", 0,
+     "avx512, avx2, sse2 or scalar (default: the widest here); the result does not depend on it",
+     2},
     {"threads", KEY_THREADS, "N", 0, "Threads; the result does not depend on it (1)", 2},
     {"project", KEY_PROJECT, "on|off", 0, "Publish links at their exact lengths (on)", 2},
     {NULL, 0, NULL, 0, "Where it goes:", 3},
@@ -112,6 +130,8 @@ static const char documentation[] =
     "  hair-server                              long hair, 60 Hz, this host\n"
     "  hair-server --motion shake               a head that shakes\n"
     "  hair-server --style bob --motion bus     a head moved by " CHANNEL_POSE " messages\n"
+    "  hair-server --motion gust --drag 2       wind; " CHANNEL_WIND " and " CHANNEL_TUNING "\n"
+    "                                           messages change both while it runs\n"
     "  hair-server --style tail.tfx --style top.tfx --head head.obj --info\n"
     "  hair-server --motion nod --ticks 240 --fast --record nod.lcmlog\n"
     "  hair-server --motion shake --ticks 600 --fast --hash\n"
@@ -201,12 +221,26 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
     case KEY_MOTION:
         options->daemon.motion = text;
         if (motion_find(text) == NULL)
-            argp_error(state, "--motion %s: must be none, bus, nod, shake, run, turn or teleport",
+            argp_error(state,
+                       "--motion %s: must be none, bus, nod, shake, jump-stop, run, flip, turn, "
+                       "teleport or gust",
                        text);
         break;
     case KEY_MODEL:
-        if (strcmp(text, "spring") != 0)
-            argp_error(state, "--model %s: only spring is there so far", text);
+        sim->model = model_find(text);
+        if (sim->model == MODEL_COUNT)
+            argp_error(
+                state,
+                "--model %s: must be spring, cascade, forest, plain, cascade-thesis or forest-z",
+                text);
+        break;
+    case KEY_KERNEL:
+        sim->kernel = text;
+        if (kernel_find(text) == NULL)
+            argp_error(state, "--kernel %s: must be one of %s here", text, kernel_names());
+        break;
+    case KEY_FORCE:
+        sim->force = true;
         break;
     case KEY_RATE:
         sim->rate_hz = number(state, "rate", text, 1, 1000);
@@ -222,6 +256,9 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
         break;
     case KEY_DAMPING:
         sim->damping_per_s = (float)number(state, "damping", text, 0, 1e4);
+        break;
+    case KEY_DRAG:
+        sim->drag_per_s = (float)number(state, "drag", text, 0, 1e4);
         break;
     case KEY_GRAVITY:
         sim->gravity_compensation = !on_off(state, "gravity", text);
@@ -406,8 +443,8 @@ static void hear(void* context, const char* channel, const uint8_t* bytes, size_
 
 static bool open_bus(Server* server, Fault* fault)
 {
-    static const char* const heard[] = {CHANNEL_POSE, CHANNEL_CHARACTER, CHANNEL_REQUEST,
-                                        CHANNEL_STATUS};
+    static const char* const heard[] = {CHANNEL_POSE,   CHANNEL_CHARACTER, CHANNEL_WIND,
+                                        CHANNEL_TUNING, CHANNEL_REQUEST,   CHANNEL_STATUS};
     server->link = link_open(server->options->url, fault);
     if (server->link == NULL) return false;
     for (size_t i = 0; i < sizeof heard / sizeof heard[0]; ++i)
@@ -575,9 +612,11 @@ static void finish(Server* server)
         DaemonStatus status = daemon_status(server->daemon);
         fprintf(stderr,
                 "hair-server: %" PRId64 " messages, %" PRId64 " bytes, %" PRId64
-                " ticks dropped, %" PRId64 " inputs refused, %" PRId64 " coordinates clamped\n",
+                " ticks dropped, %" PRId64 " inputs refused, %" PRId64
+                " coordinates clamped, %" PRId64 " strands put back to rest, %" PRId64
+                " jumps carried\n",
                 status.sent_messages, status.sent_bytes, status.overruns, status.rejected,
-                status.clamped);
+                status.clamped, status.quarantined, status.jumps);
     }
 }
 

@@ -3,11 +3,9 @@
 
 #include "messages/hairstyle.h"
 #include "messages/trig.h"
-#include "server/collide.h"
-#include "server/length.h"
-#include "server/roots.h"
-#include "server/shape.h"
-#include "server/spring.h"
+#include "server/models.h"
+#include "server/printed.h"
+#include "server/project.h"
 #include "server/strands.h"
 
 #include <math.h>
@@ -32,8 +30,12 @@ SimDefinition sim_default(void)
                            .fall_off_per_m = 25.0f,
                            .fall_off_power = 2,
                            .damping_per_s = 8.0f,
+                           .drag_per_s = 1.0f,
+                           .joint_damping_per_s = 60.0f,
+                           .down_share = 0.05f,
                            .pearl_radius_m = 0.006f,
                            .gravity_compensation = true,
+                           .tip_mass = 1.0f,
                            .threads = 1};
 }
 
@@ -56,31 +58,62 @@ static bool check_rest(const SimDefinition* d, Fault* fault)
     return true;
 }
 
-// Verlet is stable while k dt^2 < 2 (1 + c) (notes/simulation.md 4.1); c > 0 here.
 static bool check_stiffness(const SimDefinition* d, Fault* fault)
 {
-    double steps_hz = d->rate_hz * d->substeps;
-    if (d->stiffness_s2 >= 0 && (double)d->stiffness_s2 <= 2.0 * steps_hz * steps_hz) return true;
-    return fault_set(fault,
-                     "simulation: stiffness_s2 is %g; %g Hz and %d substeps take 0 to %g, more of "
-                     "either takes more",
-                     (double)d->stiffness_s2, d->rate_hz, d->substeps, 2.0 * steps_hz * steps_hz);
+    double bound = model_stiffness_bound(d), k = (double)d->stiffness_s2;
+    if (!(k >= 0.0 && k <= 1e12))
+        return fault_set(fault, "simulation: stiffness_s2 is %g; it must be 0 to 1e12", k);
+    return k <= bound || d->force ||
+           fault_set(
+               fault,
+               "simulation: stiffness_s2 is %g; %s at %g Hz and %d substeps is stable to %.0f: "
+               "lower it, or raise either",
+               k, models[d->model].name, d->rate_hz, d->substeps, bound);
+}
+
+static bool check_joint_damping(const SimDefinition* d, Fault* fault)
+{
+    double bound = model_joint_damping_bound(d), v = (double)d->joint_damping_per_s;
+    if (!in_range(v, 0, 1e6, "joint_damping_per_s", fault)) return false;
+    return v <= bound || d->force ||
+           fault_set(fault,
+                     "simulation: joint_damping_per_s is %g; %s at %g Hz and %d substeps is stable "
+                     "to %.0f: lower it, or raise either",
+                     v, models[d->model].name, d->rate_hz, d->substeps, bound);
+}
+
+static bool check_model(const SimDefinition* d, Fault* fault)
+{
+    if ((int)d->model < 0 || d->model >= MODEL_COUNT)
+        return fault_set(fault, "simulation: model %d is unknown", (int)d->model);
+    return kernel_find(d->kernel) != NULL ||
+           fault_set(fault, "simulation: kernel \"%s\" is not to be had here; it must be one of %s",
+                     d->kernel, kernel_names());
+}
+
+// What sim_tune may change.
+static bool check_tuned(const SimDefinition* d, Fault* fault)
+{
+    return in_range(d->iterations, 0, SIM_MAX_ITERATIONS, "iterations", fault) &&
+           in_range((double)d->gravity_m_s2, -1000, 1000, "gravity_m_s2", fault) &&
+           in_range((double)d->damping_per_s, 0, 1e4, "damping_per_s", fault) &&
+           in_range((double)d->drag_per_s, 0, 1e4, "drag_per_s", fault) &&
+           check_stiffness(d, fault) &&
+           in_range((double)d->pearl_radius_m, 0, 1, "pearl_radius_m", fault);
 }
 
 static bool check(const SimDefinition* d, Fault* fault)
 {
-    return in_range(d->strands, 1, SIM_MAX_STRANDS, "strands", fault) &&
+    return check_model(d, fault) && in_range(d->strands, 1, SIM_MAX_STRANDS, "strands", fault) &&
            in_range(d->nodes, 2, SIM_MAX_NODES, "nodes", fault) &&
            in_range(d->collider_count, 0, HAIRSTYLE_MAX_COLLIDERS, "colliders", fault) &&
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
-           in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) &&
-           in_range(d->iterations, 0, SIM_MAX_ITERATIONS, "iterations", fault) &&
-           in_range((double)d->gravity_m_s2, -1000, 1000, "gravity_m_s2", fault) &&
-           in_range((double)d->damping_per_s, 0, 1e4, "damping_per_s", fault) &&
-           check_stiffness(d, fault) &&
+           in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) && check_tuned(d, fault) &&
+           check_joint_damping(d, fault) &&
+           in_range((double)d->down_share, 0, 1, "down_share", fault) &&
+           in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
            in_range(d->fall_off_power, 0, 3, "fall_off_power", fault) &&
-           in_range((double)d->pearl_radius_m, 0, 1, "pearl_radius_m", fault) &&
            in_range(d->threads, 1, 256, "threads", fault) && check_rest(d, fault);
 }
 
@@ -94,25 +127,35 @@ static void* cut(char** arena, size_t count, size_t size)
 
 static size_t block_bytes(const SimDefinition* d)
 {
-    return (size_t)d->nodes *
-           (5 * sizeof(Lanes3) + (5 + (size_t)d->collider_count) * sizeof(Lanes));
+    return (size_t)d->nodes * (14 * sizeof(Lanes3) + 3 * sizeof(Angles) +
+                               (8 + (size_t)d->collider_count) * sizeof(Lanes)) +
+           sizeof(Lanes3);
 }
 
 static void cut_block(Block* block, const SimDefinition* d, char* arena)
 {
     size_t nodes = (size_t)d->nodes;
     block->nodes = d->nodes;
-    block->position = cut(&arena, nodes, sizeof(Lanes3));
-    block->previous = cut(&arena, nodes, sizeof(Lanes3));
-    block->reference = cut(&arena, nodes, sizeof(Lanes3));
-    block->acceleration = cut(&arena, nodes, sizeof(Lanes3));
-    block->rest = cut(&arena, nodes, sizeof(Lanes3));
-    block->length = cut(&arena, nodes, sizeof(Lanes));
-    block->keep = cut(&arena, nodes, sizeof(Lanes));
-    block->stiffness = cut(&arena, nodes, sizeof(Lanes));
-    block->outer_part = cut(&arena, nodes, sizeof(Lanes));
-    block->inner_part = cut(&arena, nodes, sizeof(Lanes));
+    Lanes3** vectors[] = {&block->position,  &block->previous,     &block->reference,
+                          &block->direction, &block->acceleration, &block->predicted,
+                          &block->rest,      &block->along,        &block->across,
+                          &block->carried};
+    for (size_t i = 0; i < sizeof vectors / sizeof vectors[0]; ++i)
+        *vectors[i] = cut(&arena, nodes, sizeof(Lanes3));
+    block->moment = cut(&arena, nodes + 1, sizeof(Lanes3));
+    Lanes** numbers[] = {&block->length, &block->keep,       &block->stiffness, &block->hinge,
+                         &block->mass,   &block->outer_part, &block->inner_part};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i)
+        *numbers[i] = cut(&arena, nodes, sizeof(Lanes));
     block->clearance = cut(&arena, nodes * (size_t)d->collider_count, sizeof(Lanes));
+    // Last, so that they lie in nobody else's way.
+    Lanes3** places[] = {&block->upward, &block->downward};
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; ++i)
+        *places[i] = cut(&arena, nodes, sizeof(Lanes3));
+    Angles** angles[] = {&block->angle, &block->rate, &block->rest_angle};
+    for (size_t i = 0; i < sizeof angles / sizeof angles[0]; ++i)
+        *angles[i] = cut(&arena, nodes, sizeof(Angles));
+    block->friction = cut(&arena, nodes, sizeof(Lanes));
 }
 
 static float weight_of(const SimDefinition* d, int strand, int node)
@@ -121,31 +164,150 @@ static float weight_of(const SimDefinition* d, int strand, int node)
     return d->weight == NULL ? 1.0f : (float)d->weight[strand * d->nodes + node] / 255.0f;
 }
 
+static double mass_of(const SimDefinition* d, int node)
+{
+    return node == d->nodes - 1 ? (double)d->tip_mass : 1.0;
+}
+
+// What one substep leaves of a node's distance to its reference: weight^(60 dt), so that a weight
+// means the same at every rate (the share skinned in 1/60 s is 1 - weight).
+static float keep_of(const SimDefinition* d, float weight)
+{
+    if (weight <= 0.0f) return 0.0f;
+    if (weight >= 1.0f) return 1.0f;
+    return (float)trig_pow((double)weight, 60.0 / (d->rate_hz * d->substeps));
+}
+
+// How near a node may come to a collider's centre: the sphere's radius plus the pearl's, but never
+// more than its distance at rest: a groom whose rest pose dips into the head keeps its rest pose
+// instead of being blown off it.
+static float clearance_of(const SimDefinition* d, Sphere collider, Vec3 rest)
+{
+    return fminf(collider.radius + d->pearl_radius_m, vec3_length(vec3_sub(rest, collider.centre)));
+}
+
+static Vec3 link_of(const Vec3* rest, int n)
+{
+    return vec3_sub(rest[n], rest[n - 1]);
+}
+
+static float reach_of(const Vec3* rest, int n)
+{
+    float from_root = 0.0f;
+    for (int k = 1; k <= n; ++k)
+        from_root += vec3_length(link_of(rest, k));
+    return from_root;
+}
+
+// How a link's error is shared between its ends (thesis 4.2 with the sign that pulls a stretched
+// link together): by inverse mass, all at the free end where the other is skinned, none between
+// skinned ones.
+static void fill_shares(Block* block, const SimDefinition* d, int strand, int lane, int n)
+{
+    double inner = weight_of(d, strand, n - 1) == 0.0f ? 0.0 : 1.0 / mass_of(d, n - 1);
+    double outer = weight_of(d, strand, n) == 0.0f ? 0.0 : 1.0 / mass_of(d, n);
+    double sum = inner + outer > 0.0 ? inner + outer : 1.0;
+    block->inner_part[n].v[lane] = (real)(inner / sum);
+    block->outer_part[n].v[lane] = (real)(outer / sum);
+}
+
+// K of joint n over the mass of a node: k/m d^2, d from the middle of one link to that of the next.
+// A clamped root has half a link to bend, so it is twice as stiff (notes/simulation.md 1); as
+// printed the forest knows no clamp.
+static void fill_hinge(Block* block, const SimDefinition* d, const Vec3* rest, int lane, int n)
+{
+    double k = (double)model_stiffness(d, reach_of(rest, n - 1));
+    double length = (double)vec3_length(link_of(rest, n));
+    if (n > 1) length = 0.5 * (length + (double)vec3_length(link_of(rest, n - 1)));
+    double clamp = n == 1 && d->model != MODEL_FOREST_Z ? 2.0 : 1.0;
+    block->hinge[n].v[lane] = (real)(clamp * k * length * length);
+}
+
+// What sim_tune may change.
+static void fill_tuned(Block* block, const SimDefinition* d, const Vec3* rest, int lane)
+{
+    for (int n = 0; n < d->nodes; ++n) {
+        for (int k = 0; k < d->collider_count; ++k)
+            block->clearance[k * d->nodes + n].v[lane] =
+                (real)clearance_of(d, d->colliders[k], rest[n]);
+        block->stiffness[n].v[lane] = (real)model_stiffness(d, reach_of(rest, n));
+        if (n > 0) fill_hinge(block, d, rest, lane, n);
+    }
+}
+
 static void fill_node(Block* block, const SimDefinition* d, int strand, int lane, int n)
 {
     const Vec3* rest = d->rest + (size_t)strand * (size_t)d->nodes;
-    float weight = weight_of(d, strand, n);
     lane_set(&block->rest[n], lane, rest[n]);
-    block->keep[n].v[lane] = shape_keep(weight, 1.0 / (d->rate_hz * d->substeps));
-    for (int k = 0; k < d->collider_count; ++k)
-        block->clearance[k * d->nodes + n].v[lane] =
-            collide_clearance(d->colliders[k], d->pearl_radius_m, rest[n]);
-    float from_root = 0.0f;
-    for (int k = 1; k <= n; ++k)
-        from_root += vec3_length(vec3_sub(rest[k], rest[k - 1]));
-    block->stiffness[n].v[lane] = spring_stiffness(d, from_root);
+    block->keep[n].v[lane] = (real)keep_of(d, weight_of(d, strand, n));
+    block->mass[n].v[lane] = (real)mass_of(d, n);
     if (n == 0) return;
-    block->length[n].v[lane] = vec3_length(vec3_sub(rest[n], rest[n - 1]));
-    length_shares(&block->inner_part[n].v[lane], &block->outer_part[n].v[lane],
-                  weight_of(d, strand, n - 1) == 0.0f, weight == 0.0f);
+    block->length[n].v[lane] = (real)vec3_length(link_of(rest, n));
+    fill_shares(block, d, strand, lane, n);
+}
+
+// A vector in the frame (d, u, d x u).
+static Vec3 into_frame(Vec3 v, Vec3 d, Vec3 u)
+{
+    return vec3(vec3_dot(v, d), vec3_dot(v, u), vec3_dot(v, vec3_cross(d, u)));
+}
+
+static Vec3 across(Vec3 d)
+{
+    Vec3 axis = fabsf(d.x) < 0.6f ? vec3(1, 0, 0) : vec3(0, 0, 1);
+    return vec3_normalise_or(vec3_mad(axis, d, -vec3_dot(axis, d)), vec3(0, 0, 1));
+}
+
+// The moments in the joints that carry the weight of the strand at rest: from T[n] - T[n+1] +
+// length d x F[n] = 0 on each link, F the weight outboard, tip first. They are fixed in the frames,
+// like a bend in the strand: in its rest pose it does not sag, tilted it hangs another way. Too
+// soft a strand that stands up falls over all the same.
+static void fill_carried(Vec3* carried, const SimDefinition* d, const Vec3* rest)
+{
+    Vec3 moment = vec3(0, 0, 0), load = vec3(0, 0, 0);
+    bool is_carried = d->gravity_compensation && models[d->model].has_hinges;
+    for (int n = d->nodes - 1; n >= 1; --n) {
+        load.y -= is_carried ? d->gravity_m_s2 * (float)mass_of(d, n) : 0.0f;
+        moment = vec3_sub(moment, vec3_cross(link_of(rest, n), load));
+        carried[n] = moment;
+    }
+}
+
+// The strand's shape at rest as the frames of frames.h see it: each link in the frame of the one
+// before, the first in head space. The same axis is carried along the links by the same rotation.
+static void fill_frames(Block* block, const SimDefinition* d, int strand, int lane)
+{
+    const Vec3* rest = d->rest + (size_t)strand * (size_t)d->nodes;
+    Vec3 way = vec3_normalise_or(link_of(rest, 1), vec3(0, -1, 0)), u = across(way);
+    Vec3 carried[SIM_MAX_NODES];
+    fill_carried(carried, d, rest);
+    lane_set(&block->carried[1], lane, carried[1]);
+    lane_set(&block->along[1], lane, way);
+    lane_set(&block->across[1], lane, u);
+    for (int n = 2; n < d->nodes; ++n) {
+        Vec3 next = vec3_normalise_or(link_of(rest, n), way), b = vec3_cross(way, next);
+        float c = vec3_dot(way, next), f = vec3_dot(b, u) / fmaxf(1.0f + c, 1e-4f);
+        Vec3 turned = vec3_mad(vec3_add(vec3_scale(u, c), vec3_cross(b, u)), b, f);
+        turned = vec3_mad(turned, next, -vec3_dot(turned, next));
+        turned = vec3_normalise_or(turned, across(next));
+        lane_set(&block->along[n], lane, into_frame(next, way, u));
+        lane_set(&block->across[n], lane, into_frame(turned, way, u));
+        lane_set(&block->carried[n], lane, into_frame(carried[n], way, u));
+        way = next;
+        u = turned;
+    }
 }
 
 static void fill_block(Block* block, const SimDefinition* d, int first)
 {
+    block->strands = d->strands - first < LANES ? d->strands - first : LANES;
     for (int lane = 0; lane < LANES; ++lane) {
         int strand = first + lane < d->strands ? first + lane : d->strands - 1;
         for (int n = 0; n < d->nodes; ++n)
             fill_node(block, d, strand, lane, n);
+        fill_tuned(block, d, d->rest + (size_t)strand * (size_t)d->nodes, lane);
+        fill_frames(block, d, strand, lane);
+        printed_fill(block, d, strand, lane);
     }
 }
 
@@ -153,11 +315,17 @@ static void fill_substeps(Sim* sim)
 {
     const SimDefinition* d = &sim->definition;
     double dt = 1.0 / (d->rate_hz * d->substeps);
+    bool compensated = d->gravity_compensation && models[d->model].drops_gravity;
+    float gravity = d->gravity_m_s2 - (compensated ? sim->gravity_at_rest : 0.0f);
     for (int s = 0; s < d->substeps; ++s)
         sim->substeps[s] =
-            (Substep){.dt2 = (float)(dt * dt),
+            (Substep){.dt = (float)dt,
+                      .dt2 = (float)(dt * dt),
+                      .model = (int)d->model,
+                      .outermost = d->outermost,
+                      .down_share = d->down_share,
                       .velocity_kept = (float)trig_exp(-(double)d->damping_per_s * dt),
-                      .gravity_m_s2 = spring_gravity(d),
+                      .gravity_m_s2 = gravity,
                       .iterations = d->iterations,
                       .collider_count = d->collider_count};
 }
@@ -184,6 +352,8 @@ static void fill(Sim* sim, const SimDefinition* d)
     for (int k = 0; k < d->collider_count; ++k)
         sim->colliders[k] = d->colliders[k];
     sim->definition = *d;
+    sim->gravity_at_rest = d->gravity_m_s2;
+    sim->kernel = kernel_find(d->kernel);
     sim->definition.rest = NULL;
     sim->definition.weight = NULL;
     sim->definition.colliders = NULL;
@@ -216,15 +386,59 @@ void sim_destroy(Sim* sim)
     free(sim);
 }
 
+static bool is_tuned_alike(const SimDefinition* a, const SimDefinition* b)
+{
+    return a->stiffness_s2 == b->stiffness_s2 && a->damping_per_s == b->damping_per_s &&
+           a->gravity_m_s2 == b->gravity_m_s2 && a->drag_per_s == b->drag_per_s &&
+           a->iterations == b->iterations && a->pearl_radius_m == b->pearl_radius_m;
+}
+
+bool sim_tune(Sim* sim, const SimDefinition* wanted, Fault* fault)
+{
+    SimDefinition d = sim->definition;
+    d.stiffness_s2 = wanted->stiffness_s2;
+    d.damping_per_s = wanted->damping_per_s;
+    d.gravity_m_s2 = wanted->gravity_m_s2;
+    d.drag_per_s = wanted->drag_per_s;
+    d.iterations = wanted->iterations;
+    d.pearl_radius_m = wanted->pearl_radius_m;
+    if (!check_tuned(&d, fault)) return false;
+    if (is_tuned_alike(&d, &sim->definition)) return true; // senders repeat themselves
+    sim->definition = d;
+    fill_substeps(sim);
+    d.colliders = sim->colliders;
+    Vec3 rest[SIM_MAX_NODES];
+    for (int i = 0; i < sim->block_count * LANES; ++i) {
+        for (int n = 0; n < d.nodes; ++n)
+            rest[n] = lane_get(&sim->blocks[i / LANES].rest[n], i % LANES);
+        fill_tuned(&sim->blocks[i / LANES], &d, rest, i % LANES);
+    }
+    return true;
+}
+
+const SimDefinition* sim_definition(const Sim* sim)
+{
+    return &sim->definition;
+}
+
+static void place(Block* block, const float rotation[9])
+{
+    for (int n = 0; n < block->nodes; ++n)
+        for (int l = 0; l < LANES; ++l)
+            lane_set(&block->reference[n], l, rotate(rotation, lane_get(&block->rest[n], l)));
+}
+
 void sim_reset(Sim* sim, const float rotation[9])
 {
     memcpy(sim->rotation, rotation, sizeof sim->rotation);
     for (int b = 0; b < sim->block_count; ++b) {
         Block* block = &sim->blocks[b];
-        roots_place(block, rotation);
+        place(block, rotation);
         size_t bytes = (size_t)block->nodes * sizeof(Lanes3);
         memcpy(block->position, block->reference, bytes);
         memcpy(block->previous, block->reference, bytes);
+        memset(block->angle, 0, (size_t)block->nodes * sizeof(Angles));
+        memset(block->rate, 0, (size_t)block->nodes * sizeof(Angles));
     }
 }
 
@@ -254,11 +468,11 @@ static void read_strand(const Block* block, int lane, const float rotation[9], b
     float lengths[SIM_MAX_NODES];
     for (int n = 0; n < block->nodes; ++n) {
         skinned[n] = block->keep[n].v[lane] == 0.0f;
-        lengths[n] = block->length[n].v[lane];
+        lengths[n] = (float)block->length[n].v[lane];
         strand[n] = skinned[n] ? lane_get(&block->rest[n], lane)
                                : rotate_back(rotation, lane_get(&block->position[n], lane));
     }
-    if (project) length_project(strand, block->nodes, lengths, skinned);
+    if (project) project_lengths(strand, block->nodes, lengths, skinned);
 }
 
 void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* positions)
@@ -279,6 +493,22 @@ void sim_state(const Sim* sim, Vec3* positions, Vec3* previous)
     }
 }
 
+int64_t sim_quarantined(const Sim* sim)
+{
+    int64_t sum = 0;
+    for (int b = 0; b < sim->block_count; ++b)
+        sum += sim->blocks[b].quarantined;
+    return sum;
+}
+
+static void hash_angles(const Block* block, int n, int lane, void* hash_state)
+{
+    const Angles *angle = &block->angle[n], *rate = &block->rate[n];
+    float state[4] = {(float)angle->theta[lane], (float)angle->phi[lane], (float)rate->theta[lane],
+                      (float)rate->phi[lane]};
+    XXH64_update(hash_state, state, sizeof state);
+}
+
 void sim_hash(const Sim* sim, void* hash_state)
 {
     int nodes = sim->definition.nodes;
@@ -287,5 +517,7 @@ void sim_hash(const Sim* sim, void* hash_state)
         Vec3 node[2] = {lane_get(&block->position[i % nodes], i / nodes % LANES),
                         lane_get(&block->previous[i % nodes], i / nodes % LANES)};
         XXH64_update(hash_state, node, sizeof node);
+        if (models[sim->definition.model].has_angles)
+            hash_angles(block, i % nodes, i / nodes % LANES, hash_state);
     }
 }

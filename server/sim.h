@@ -11,27 +11,53 @@
 #include "messages/base.h"
 #include "messages/vec.h"
 
+#include <stdint.h>
+
 typedef struct Sim Sim;
+
+// A way for strands to move: a file of forces, a row in kernel.c, a row in models.c.
+typedef enum ModelKind {
+    MODEL_SPRING,
+    MODEL_CASCADE,
+    MODEL_FOREST,
+    MODEL_PLAIN,
+    MODEL_CASCADE_THESIS, // as printed, kept for its failures; so is the next
+    MODEL_FOREST_Z,
+    MODEL_COUNT
+} ModelKind;
 
 // What is simulated and how. Start from sim_default().
 typedef struct SimDefinition {
+    ModelKind model;
+    const char* kernel; // "avx512", "avx2", "sse2", "scalar"; NULL: the widest that runs here
     int strands, nodes; // nodes of every strand, node 0 the root
     const Vec3* rest;   // [strand][node], head space, m; copied
     const uint8_t*
         weight; // [strand][node], 255 physics ... 0 skinned; NULL: all physics but node 0
     const Sphere* colliders; // head space; copied
     int collider_count;
-    double rate_hz;       // ticks a second
-    int substeps;         // of a tick
-    int iterations;       // length-correction sweeps a substep
-    float gravity_m_s2;   // along -Y
-    float stiffness_s2;   // k/m of the first node, 1/s^2
+    double rate_hz;     // ticks a second
+    int substeps;       // of a tick
+    int iterations;     // length-correction sweeps a substep
+    float gravity_m_s2; // along -Y
+    // k/m, 1/s^2: of the first node's spring to its rest place (spring), or across the first joint,
+    // EI / (m d^3) (the others).
+    float stiffness_s2;
     float fall_off_per_m; // c in k(L) = k / max(1, c L)^a, L m from the root (thesis 5.9, mended)
     int fall_off_power;   // a: 0 none, 1 linear, 2 quadratic, 3 cubic
-    float damping_per_s;  // velocity relative to the head decays as exp(-damping t)
-    float pearl_radius_m; // every node collides as a sphere of this radius (Nalu 23.2.2)
-    bool gravity_compensation; // rest is equilibrium under gravity at every tilt
-    int threads;               // OpenMP threads over blocks; result does not depend on it
+    // Velocity relative to the head decays as exp(-damping t); forest-z has its joints' alone.
+    float damping_per_s;
+    float drag_per_s;          // where a wind blows, velocity relative to it decays as exp(-drag t)
+    float joint_damping_per_s; // forest-z: v/J of a joint, J = m d^2 (thesis 4.2.2)
+    float down_share;          // cascade-thesis: the downward springs' part of the upward ones' k
+    float pearl_radius_m;      // every node collides as a sphere of this radius (Nalu 23.2.2)
+    // Rest is equilibrium under gravity: at every tilt (spring, cascade-thesis, forest-z: gravity
+    // is left out), untilted (cascade, forest: the joints carry the weight), not at all (plain).
+    bool gravity_compensation;
+    float tip_mass; // of the last node, in masses of the others: 1, or a half
+    bool outermost; // forest: the head's acceleration acts on the tips alone
+    bool force;     // take what is beyond the stability bound
+    int threads;    // OpenMP threads over blocks; result does not depend on it
 } SimDefinition;
 
 SimDefinition sim_default(void);
@@ -40,11 +66,24 @@ SimDefinition sim_default(void);
 Sim* sim_create(const SimDefinition* definition, Fault* fault);
 void sim_destroy(Sim* sim);
 
-// The head at the end of one substep, relative to the state's origin.
+// The head at the end of one substep, and the air around it, relative to the state's origin.
 typedef struct SimHead {
     float rotation[9];      // row-major: world = rotation * head
     Vec3 second_difference; // x(t+dt) - 2 x(t) + x(t-dt) of the head's position, m, world axes
+    Vec3 move;              // x(t+dt) - x(t) of it; only the wind asks
+    // Velocity of the air, world axes, m/s. Without a wind there is no drag: damping stands for
+    // still air. Drag comes in over the first m/s, so that a breeze is no jolt.
+    Vec3 wind;
 } SimHead;
+
+// Takes stiffness, damping, gravity, drag, iterations and pearl radius from `wanted`, from the next
+// step on; the state is not touched, nothing is allocated, and the rest of `wanted` is not read.
+// Compensation of gravity stays that of the first definition: hair tuned to less of it (under
+// water) rises. False with a fault where a value is out of range; nothing is then changed.
+bool sim_tune(Sim* sim, const SimDefinition* wanted, Fault* fault);
+
+// What is simulated now; its pointers are NULL.
+const SimDefinition* sim_definition(const Sim* sim);
 
 // Advances one tick; `heads` has one entry per substep. Allocates nothing.
 void sim_step(Sim* sim, const SimHead* heads);
@@ -62,6 +101,11 @@ void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* 
 // World-axes positions relative to the head, as simulated: [strand][node]; for measurements.
 void sim_state(const Sim* sim, Vec3* positions, Vec3* previous);
 
-// Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position then
-// previous position; padding lanes left out. `hash_state` is an XXH64_state_t*.
+// How many times a strand was put back to rest at the end of a tick, because a node of it was not
+// finite or 1 km away. The other strands are not touched.
+int64_t sim_quarantined(const Sim* sim);
+
+// Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position,
+// previous position, then what other state the model has; padding lanes left out. `hash_state` is
+// an XXH64_state_t*.
 void sim_hash(const Sim* sim, void* hash_state);

@@ -1,33 +1,21 @@
-// The table of contents of the dynamics: what happens in a tick, in which order.
-#include "server/collide.h"
-#include "server/integrate.h"
-#include "server/length.h"
-#include "server/roots.h"
-#include "server/shape.h"
-#include "server/spring.h"
+// A tick: the head's motion to substeps, blocks to kernels, blocks to threads.
+#include "messages/trig.h"
+#include "server/strands.h"
 
 #include <omp.h>
 #include <string.h>
 
-static void step_block(Block* block, const Substep* substep)
+#define FULL_DRAG_M_S 1.0f // of wind
+
+static void meet_air(const SimDefinition* definition, Substep* substep, const SimHead* head)
 {
-    roots_place(block, substep->rotation);
-    spring_accelerate(block, substep);
-    integrate_verlet(block, substep);
-    shape_blend(block);
-    for (int i = 0; i < substep->iterations; ++i)
-        length_correct(block);
-    collide_spheres(block, substep);
+    double speed = (double)(vec3_length(head->wind) / FULL_DRAG_M_S);
+    double drag = (double)definition->drag_per_s * trig_smooth(speed);
+    substep->drag = drag > 0.0 ? (float)(1.0 - trig_exp(-drag * (double)substep->dt)) : 0.0f;
+    substep->air_move = vec3_sub(vec3_scale(head->wind, substep->dt), head->move);
 }
 
-// A block goes through all substeps of the tick before the next begins: it stays in the cache.
-static void step_block_tick(const Sim* sim, int block)
-{
-    for (int s = 0; s < sim->definition.substeps; ++s)
-        step_block(&sim->blocks[block], &sim->substeps[s]);
-}
-
-// The parts of the substeps that the head's motion decides.
+// The parts of the substeps that the head's motion decides, and the wind.
 static void prepare_substeps(Sim* sim, const SimHead* heads)
 {
     int colliders = sim->definition.collider_count;
@@ -35,6 +23,7 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
         Substep* substep = &sim->substeps[s];
         memcpy(substep->rotation, heads[s].rotation, sizeof substep->rotation);
         substep->second_difference = heads[s].second_difference;
+        meet_air(&sim->definition, substep, &heads[s]);
         Vec3* centre = sim->centres + 2 * colliders * s;
         Vec3* move = centre + colliders;
         for (int k = 0; k < colliders; ++k) {
@@ -47,17 +36,25 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
     }
 }
 
+static void step_gang(const Sim* sim, int gang)
+{
+    int first = gang * KERNEL_GANG, left = sim->block_count - first;
+    sim->kernel->step(&sim->blocks[first], left < KERNEL_GANG ? left : KERNEL_GANG, sim->substeps,
+                      sim->definition.substeps);
+}
+
 void sim_step(Sim* sim, const SimHead* heads)
 {
     prepare_substeps(sim, heads);
-    int blocks = sim->block_count, threads = sim->definition.threads;
+    int gangs = (sim->block_count + KERNEL_GANG - 1) / KERNEL_GANG;
+    int threads = sim->definition.threads;
     // libgomp allocates a team for a nested region, even of one thread; a plain loop does not.
-    if (threads <= 1 || blocks == 1 || omp_in_parallel()) {
-        for (int b = 0; b < blocks; ++b)
-            step_block_tick(sim, b);
+    if (threads <= 1 || gangs == 1 || omp_in_parallel()) {
+        for (int g = 0; g < gangs; ++g)
+            step_gang(sim, g);
         return;
     }
 #pragma omp parallel for num_threads(threads) schedule(static)
-    for (int b = 0; b < blocks; ++b)
-        step_block_tick(sim, b);
+    for (int g = 0; g < gangs; ++g)
+        step_gang(sim, g);
 }

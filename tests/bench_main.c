@@ -5,6 +5,7 @@
 #include "messages/style.h"
 #include "server/load.h"
 #include "server/sim.h"
+#include "tests/studies.h"
 
 #include <argp.h>
 #include <math.h>
@@ -322,6 +323,11 @@ static const Case cases[] = {
 
 #define CASES (sizeof cases / sizeof cases[0])
 
+static const Study studies[] = {
+    {"sim", "what a tick costs, by model, kernel, strands, nodes, iterations, threads", study_sim},
+};
+#define STUDIES (sizeof studies / sizeof studies[0])
+
 // --- measuring
 // ------------------------------------------------------------------------------------
 
@@ -405,6 +411,7 @@ typedef struct Options {
     int repeats;
     bool wanted[CASES];
     bool any;
+    const Study* study;
 } Options;
 
 static const struct argp_option arguments[] = {
@@ -419,12 +426,18 @@ static const char documentation[] =
     "  hair-bench                     all of them\n"
     "  hair-bench step frame          only these\n"
     "  hair-bench --repeats 99 step > step.csv\n"
+    "  hair-bench sim > sim.csv       a study, with columns of its own\n"
     "  hair-bench --list\n"
     "Exit status: 0 done, 1 failed, 2 wrong arguments.";
 
 static void choose(struct argp_state* state, const char* name, Options* options)
 {
     bool found = false;
+    for (size_t i = 0; i < STUDIES; ++i)
+        if (strcmp(studies[i].name, name) == 0) {
+            options->study = &studies[i];
+            return;
+        }
     for (size_t i = 0; i < CASES; ++i)
         if (strcmp(cases[i].name, name) == 0) options->wanted[i] = found = true;
     if (!found) argp_error(state, "%s: no such bench; --list names them", name);
@@ -454,6 +467,18 @@ static error_t parse(int key, char* text, struct argp_state* state)
     }
 }
 
+static int run_study(const Options* options)
+{
+    Fault fault = {""};
+    if (options->any) {
+        fprintf(stderr, "hair-bench: %s is a study: name it alone\n", options->study->name);
+        return 2;
+    }
+    bool done = options->study->run(&fault);
+    if (!done) fprintf(stderr, "hair-bench: %s: %s\n", options->study->name, fault.text);
+    return done && fflush(stdout) == 0 ? 0 : 1;
+}
+
 int main(int argc, char** argv)
 {
     Options options = {.repeats = 15};
@@ -462,6 +487,9 @@ int main(int argc, char** argv)
     argp_program_version = "hair-bench (strandcast) " STRANDCAST_VERSION;
     argp_err_exit_status = 2;
     argp_parse(&argp, argc, argv, 0, NULL, &options);
+    if (options.study != NULL && !options.list) return run_study(&options);
+    for (size_t i = 0; options.list && i < STUDIES; ++i)
+        printf("%-8s %s (a study: columns of its own)\n", studies[i].name, studies[i].help);
     if (!options.list) printf("bench,case,unit,min,median,repeats\n");
     bool done = true;
     for (size_t i = 0; i < CASES; ++i) {

@@ -15,6 +15,8 @@
 #include <hair_pose_t.h>
 #include <hair_request_t.h>
 #include <hair_status_t.h>
+#include <hair_tuning_t.h>
+#include <hair_wind_t.h>
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,7 +40,9 @@ static const StatusMessage STATUS = {.utime = 8,
                                      .clamped = 2,
                                      .rejected = 3,
                                      .sent_messages = 4,
-                                     .sent_bytes = 5000000000};
+                                     .sent_bytes = 5000000000,
+                                     .quarantined = 6,
+                                     .jumps = 7};
 static const uint8_t PAYLOAD[] = {9, 8, 7, 6, 5};
 static const AppliedMessage APPLIED = {.utime = 8,
                                        .epoch = 9,
@@ -47,7 +51,24 @@ static const AppliedMessage APPLIED = {.utime = 8,
                                        .size = sizeof PAYLOAD,
                                        .payload = PAYLOAD};
 
-enum { KINDS = 5, BUFFER_BYTES = 2048 };
+static const WindMessage WIND = {.utime = 9,
+                                 .first_slot = 3,
+                                 .slot_count = 1021,
+                                 .velocity = {8, -0.5f, 2},
+                                 .gust = 0.25f,
+                                 .gust_hz = 3.1f};
+static const TuningMessage TUNING = {.utime = 10,
+                                     .first_slot = 0,
+                                     .slot_count = 1024,
+                                     .set = TUNING_EVERY,
+                                     .stiffness_s2 = 300,
+                                     .damping_per_s = 6,
+                                     .gravity_m_s2 = -2,
+                                     .drag_per_s = 4,
+                                     .iterations = 3,
+                                     .pearl_radius_m = 0.01f};
+
+enum { KINDS = 7, BUFFER_BYTES = 2048 };
 
 static size_t encode(int kind, uint8_t* bytes, size_t capacity)
 {
@@ -60,6 +81,10 @@ static size_t encode(int kind, uint8_t* bytes, size_t capacity)
         return request_encode(bytes, capacity, &REQUEST);
     case 3:
         return status_encode(bytes, capacity, &STATUS);
+    case 5:
+        return wind_encode(bytes, capacity, &WIND);
+    case 6:
+        return tuning_encode(bytes, capacity, &TUNING);
     default:
         return applied_encode(bytes, capacity, &APPLIED);
     }
@@ -70,7 +95,9 @@ static size_t encode_with_lcm_gen(int kind, uint8_t* bytes)
     hair_pose_t pose = {5, {1, -2, 3e5}, {0.6, 0, 0, 0.8}, 9, 7, 1};
     hair_character_t character = {6, 1023, 1, "long"};
     hair_request_t request = {7, (int64_t)REQUEST.style_hash, 3, 1, {1, 2, [511] = 3}};
-    hair_status_t status = {8, 9, 10, 60, 123.5f, 2, 128, 1, 2, 3, 4, 5000000000};
+    hair_status_t status = {8, 9, 10, 60, 123.5f, 2, 128, 1, 2, 3, 4, 5000000000, 6, 7};
+    hair_wind_t wind = {9, 3, 1021, {8, -0.5f, 2}, 0.25f, 3.1f};
+    hair_tuning_t tuning = {10, 0, 1024, 63, 300, 6, -2, 4, 3, 0.01f};
     hair_applied_t applied = {8, 9, 10, "HAIR_POSE", sizeof PAYLOAD, (uint8_t*)PAYLOAD};
     switch (kind) {
     case 0:
@@ -81,6 +108,10 @@ static size_t encode_with_lcm_gen(int kind, uint8_t* bytes)
         return (size_t)hair_request_t_encode(bytes, 0, BUFFER_BYTES, &request);
     case 3:
         return (size_t)hair_status_t_encode(bytes, 0, BUFFER_BYTES, &status);
+    case 5:
+        return (size_t)hair_wind_t_encode(bytes, 0, BUFFER_BYTES, &wind);
+    case 6:
+        return (size_t)hair_tuning_t_encode(bytes, 0, BUFFER_BYTES, &tuning);
     default:
         return (size_t)hair_applied_t_encode(bytes, 0, BUFFER_BYTES, &applied);
     }
@@ -95,6 +126,8 @@ static bool decode(int kind, const uint8_t* bytes, size_t size, Fault* fault)
         RequestMessage request;
         StatusMessage status;
         AppliedMessage applied;
+        WindMessage wind;
+        TuningMessage tuning;
     } m;
     uint8_t* copy = malloc(size > 0 ? size : 1);
     memcpy(copy, bytes, size);
@@ -111,6 +144,12 @@ static bool decode(int kind, const uint8_t* bytes, size_t size, Fault* fault)
         break;
     case 3:
         decoded = status_decode(&m.status, copy, size, fault);
+        break;
+    case 5:
+        decoded = wind_decode(&m.wind, copy, size, fault);
+        break;
+    case 6:
+        decoded = tuning_decode(&m.tuning, copy, size, fault);
         break;
     default:
         decoded = applied_decode(&m.applied, copy, size, fault);
@@ -153,11 +192,24 @@ static void control_decode_returns_what_was_encoded(void** state)
     assert_true(status_decode(&status, bytes, encode(3, bytes, sizeof bytes), NULL));
     assert_true(status.sent_bytes == 5000000000 && status.step_us == 123.5f);
     assert_true(status.clamped == 2 && status.rejected == 3 && status.strands == 128);
+    assert_int_equal(status.quarantined, 6);
+    assert_int_equal(status.jumps, 7);
     AppliedMessage applied;
     assert_true(applied_decode(&applied, bytes, encode(4, bytes, sizeof bytes), NULL));
     assert_string_equal(applied.channel, "HAIR_POSE");
     assert_int_equal(applied.size, sizeof PAYLOAD);
     assert_memory_equal(applied.payload, PAYLOAD, sizeof PAYLOAD);
+    WindMessage wind;
+    assert_true(wind_decode(&wind, bytes, encode(5, bytes, sizeof bytes), NULL));
+    assert_true(wind.utime == 9 && wind.first_slot == 3 && wind.slot_count == 1021);
+    assert_memory_equal(&wind.velocity, &WIND.velocity, sizeof wind.velocity);
+    assert_true(wind.gust == 0.25f && wind.gust_hz == 3.1f);
+    TuningMessage tuning;
+    assert_true(tuning_decode(&tuning, bytes, encode(6, bytes, sizeof bytes), NULL));
+    assert_true(tuning.first_slot == 0 && tuning.slot_count == 1024 && tuning.set == 63);
+    assert_true(tuning.stiffness_s2 == 300.0f && tuning.damping_per_s == 6.0f);
+    assert_true(tuning.gravity_m_s2 == -2.0f && tuning.drag_per_s == 4.0f);
+    assert_true(tuning.iterations == 3 && tuning.pearl_radius_m == 0.01f);
 }
 
 static void control_decode_rejects_every_other_size_and_type(void** state)
@@ -187,9 +239,11 @@ typedef struct WrongField {
     const char* named; // by the fault
 } WrongField;
 
-#define INFINITE     0x7ff0000000000000u
-#define NOT_A_NUMBER 0x7ff8000000000000u
-#define TWO_BILLION  0x41dfffffffc00000u
+#define INFINITE      0x7ff0000000000000u
+#define NOT_A_NUMBER  0x7ff8000000000000u
+#define TWO_BILLION   0x41dfffffffc00000u
+#define NAN_BITS      0x7fc00000u // of floats
+#define INFINITE_BITS 0x7f800000u
 
 static void control_decode_names_every_wrong_field(void** state)
 {
@@ -219,6 +273,8 @@ static void control_decode_names_every_wrong_field(void** state)
         {3, 36, 4, 5000, "characters"},
         {3, 40, 4, 0x80000000u, "count"},
         {3, 76, 8, UINT64_MAX, "count"},
+        {3, 84, 8, UINT64_MAX, "count"},
+        {3, 92, 8, UINT64_MAX, "count"},
         {4, 24, 4, 0x80000000u, "tick"},
         {4, 28, 1, 0, "channel"},
         {4, 30, 1, 7, "channel"},
@@ -227,6 +283,33 @@ static void control_decode_names_every_wrong_field(void** state)
         {4, 48, 4, 6, "payload"},
         {4, 48, 4, 0xffffffffu, "payload"},
         {4, 48, 4, 0x7fffffffu, "payload"},
+        {5, 8, 8, UINT64_MAX, "utime"},
+        {5, 16, 2, 4, "slots"},
+        {5, 16, 2, 0xffff, "slots"},
+        {5, 18, 2, 0, "slots"},
+        {5, 18, 2, 0xffff, "slots"},
+        {5, 20, 4, NAN_BITS, "velocity"},
+        {5, 24, 4, INFINITE_BITS, "velocity"},
+        {5, 28, 4, 0x43490000u, "velocity"}, // 201
+        {5, 32, 4, 0xbf800000u, "gust"},
+        {5, 32, 4, NAN_BITS, "gust"},
+        {5, 36, 4, INFINITE_BITS, "gust_hz"},
+        {6, 8, 8, UINT64_MAX, "utime"},
+        {6, 16, 2, 1, "slots"},
+        {6, 18, 2, 0, "slots"},
+        {6, 18, 2, 1025, "slots"},
+        {6, 20, 1, 0, "set"},
+        {6, 20, 1, 64, "set"},
+        {6, 20, 1, 0xff, "set"},
+        {6, 21, 4, NAN_BITS, "stiffness_s2"},
+        {6, 21, 4, 0xbf800000u, "stiffness_s2"},
+        {6, 21, 4, INFINITE_BITS, "stiffness_s2"},
+        {6, 25, 4, NAN_BITS, "damping_per_s"},
+        {6, 29, 4, NAN_BITS, "gravity_m_s2"},
+        {6, 33, 4, INFINITE_BITS, "drag_per_s"},
+        {6, 37, 4, 0xffffffffu, "iterations"},
+        {6, 37, 4, 65, "iterations"},
+        {6, 41, 4, 0x40000000u, "pearl_radius_m"}, // 2
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
         uint8_t bytes[BUFFER_BYTES];
@@ -280,6 +363,12 @@ static void control_encode_refuses_what_decode_would(void** state)
     pose = POSE;
     pose.pose.orientation = (Quat){0, 0, 0, 0};
     assert_int_equal(pose_encode(bytes, sizeof bytes, &pose), 0);
+    WindMessage wind = WIND;
+    wind.velocity.y = NAN;
+    assert_int_equal(wind_encode(bytes, sizeof bytes, &wind), 0);
+    TuningMessage tuning = TUNING;
+    tuning.set = 0;
+    assert_int_equal(tuning_encode(bytes, sizeof bytes, &tuning), 0);
     AppliedMessage applied = APPLIED;
     applied.size = CONTROL_MAX_BYTES;
     assert_int_equal(applied_encode(bytes, sizeof bytes, &applied), 0);

@@ -143,6 +143,23 @@ static void send_character(Daemon* daemon, int slot, CharacterVerb verb, const c
                    character_encode(bytes, sizeof bytes, &message));
 }
 
+static void send_wind(Daemon* daemon, int first, int count, Vec3 velocity, float gust)
+{
+    uint8_t bytes[CONTROL_MAX_BYTES];
+    WindMessage message = {.first_slot = (uint16_t)first,
+                           .slot_count = (uint16_t)count,
+                           .velocity = velocity,
+                           .gust = gust,
+                           .gust_hz = 3};
+    daemon_receive(daemon, CHANNEL_WIND, bytes, wind_encode(bytes, sizeof bytes, &message));
+}
+
+static void send_tuning(Daemon* daemon, TuningMessage message)
+{
+    uint8_t bytes[CONTROL_MAX_BYTES];
+    daemon_receive(daemon, CHANNEL_TUNING, bytes, tuning_encode(bytes, sizeof bytes, &message));
+}
+
 static bool try_scene(const char* text, DaemonOptions* options, char path[64], Fault* fault)
 {
     strcpy(path, P_tmpdir "/strandcast-scene-XXXXXX");
@@ -311,6 +328,33 @@ static void a_carry_leaves_the_hair_bit_equal(void** state)
     daemon_destroy(carried);
 }
 
+static void a_jump_without_a_segment_is_carried_told_once_and_counted(void** state)
+{
+    (void)state;
+    DaemonOptions a = options_for(&heard, "bus"), b = options_for(&other, "bus");
+    Daemon *still = create(&a, &heard), *jumping = create(&b, &other);
+    for (int n = 0; n < 240; ++n) {
+        double sway = n < 60 ? 0.3 * sin(4.0 * M_PI * n / 60.0) : 0.0;
+        double jump = n < 120 ? 0.0 : n < 180 ? 2.0 : 1.0;
+        send_pose_of(still, n / 60.0, sway, 0.0, 1, POSE_FOLLOW);
+        send_pose_of(jumping, n / 60.0, sway + jump, 0.0, 1, POSE_FOLLOW);
+        tick(still, &heard);
+        tick(jumping, &other);
+        daemon_publish_background(jumping, 16667);
+        assert_true(same_hair());
+        assert_int_equal(other.frame[0].segment, heard.frame[0].segment + (n >= 120) + (n >= 180));
+    }
+    assert_true(other.frame[0].pose.position.x == 1.0);
+    assert_int_equal(other.notices, 1);
+    assert_non_null(strstr(other.notice, "jumped"));
+    assert_int_equal(daemon_status(jumping).jumps, 2);
+    assert_int_equal(daemon_status(jumping).rejected, 0);
+    assert_int_equal(other.status.jumps, 2);
+    assert_int_equal(daemon_status(still).jumps, 0);
+    daemon_destroy(still);
+    daemon_destroy(jumping);
+}
+
 static void a_reset_brings_hair_to_rest_and_a_fast_follow_does_not(void** state)
 {
     (void)state;
@@ -373,6 +417,141 @@ static void a_teleporting_motion_keeps_hair_at_rest(void** state)
     }
     daemon_destroy(jumping);
     daemon_destroy(rest);
+}
+
+// Tips that are further than 5 % of the box from where `other` has them, along x.
+static int tips_blown(void)
+{
+    int blown = 0;
+    for (int i = 0; i < 64; ++i) {
+        int at = (i * 8 + 7) * 3;
+        blown += heard.positions[0][at] - other.positions[0][at] > 65535 / 20;
+    }
+    return blown;
+}
+
+static void a_gust_visibly_moves_long_hair_and_it_comes_back(void** state)
+{
+    (void)state;
+    DaemonOptions a = options_for(&heard, "gust"), b = options_for(&other, "none");
+    Daemon *blown = create(&a, &heard), *rest = create(&b, &other);
+    tick(rest, &other);
+    for (int n = 0; n < 240; ++n) {
+        tick(blown, &heard);
+        if (n == 0) assert_int_equal(tips_blown(), 0);
+        if (n == 50) assert_true(tips_blown() > 32);
+    }
+    for (int i = 0; i < 64 * 8 * 3; ++i)
+        assert_in_range(heard.positions[0][i] + 200 - other.positions[0][i], 0, 400);
+    assert_int_equal(daemon_status(blown).clamped, 0);
+    daemon_destroy(blown);
+    daemon_destroy(rest);
+}
+
+static void a_wind_blows_on_its_slots_until_it_is_over(void** state)
+{
+    (void)state;
+    DaemonOptions a = options_for(&heard, "none"), b = options_for(&other, "none");
+    a.characters = b.characters = 2;
+    Daemon *blown = create(&a, &heard), *rest = create(&b, &other);
+    tick(rest, &other);
+    for (int n = 0; n < 300; ++n) {
+        if (n == 5) send_wind(blown, 0, 1, vec3(8, 0, 0), 0.25f);
+        if (n == 100) send_wind(blown, 0, 1024, vec3(0, 0, 0), 0.0f);
+        tick(blown, &heard);
+        if (n == 4) assert_int_equal(tips_blown(), 0);
+        if (n == 60) assert_true(tips_blown() > 32);
+        if (n < 100)
+            assert_memory_equal(heard.positions[1], other.positions[1], sizeof heard.positions[1]);
+    }
+    assert_int_equal(heard.applied, 2);
+    assert_string_equal(heard.last_applied.channel, CHANNEL_WIND);
+    for (int i = 0; i < 64 * 8 * 3; ++i)
+        assert_in_range(heard.positions[0][i] + 200 - other.positions[0][i], 0, 400);
+    daemon_destroy(blown);
+    daemon_destroy(rest);
+}
+
+// The hash of a daemon that was made so, or was made otherwise and tuned before its first tick.
+static uint64_t hash_of_tuned(const TuningMessage* tuning, SimDefinition made)
+{
+    DaemonOptions options = options_for(&heard, "shake");
+    options.sim = made;
+    Daemon* daemon = create(&options, &heard);
+    if (tuning != NULL) send_tuning(daemon, *tuning);
+    for (int n = 0; n < 60; ++n)
+        tick(daemon, &heard);
+    assert_int_equal(daemon_status(daemon).rejected, 0);
+    assert_int_equal(heard.applied, tuning != NULL);
+    if (tuning != NULL) assert_string_equal(heard.last_applied.channel, CHANNEL_TUNING);
+    if (tuning != NULL) assert_int_equal(heard.last_applied.tick, 0);
+    uint64_t hash = daemon_state_hash(daemon);
+    daemon_destroy(daemon);
+    return hash;
+}
+
+static void a_tuned_daemon_goes_on_as_one_that_was_made_so(void** state)
+{
+    (void)state;
+    TuningMessage tuning = {.slot_count = 1024,
+                            .stiffness_s2 = 300,
+                            .damping_per_s = 5,
+                            .drag_per_s = 3,
+                            .iterations = 2,
+                            .pearl_radius_m = 0.01f};
+    SimDefinition plain = sim_default(), made = plain;
+    tuning.set = TUNING_EVERY & ~TUNING_GRAVITY;
+    made.stiffness_s2 = 300;
+    made.damping_per_s = 5;
+    made.iterations = 2;
+    made.pearl_radius_m = 0.01f;
+    assert_true(hash_of_tuned(&tuning, plain) == hash_of_tuned(NULL, made));
+    // A bit that is not set leaves its field.
+    tuning.set = TUNING_DAMPING;
+    made = plain;
+    made.damping_per_s = 5;
+    assert_true(hash_of_tuned(&tuning, plain) == hash_of_tuned(NULL, made));
+    assert_true(hash_of_tuned(&tuning, plain) != hash_of_tuned(NULL, plain));
+}
+
+static void less_gravity_lifts_the_hair_of_its_slots_within_a_tick(void** state)
+{
+    (void)state;
+    DaemonOptions a = options_for(&heard, "none"), b = options_for(&other, "none");
+    a.characters = b.characters = 2;
+    Daemon *wet = create(&a, &heard), *dry = create(&b, &other);
+    tick(wet, &heard);
+    tick(dry, &other);
+    assert_true(same_hair());
+    send_tuning(wet, (TuningMessage){.first_slot = 1, .slot_count = 1, .set = TUNING_GRAVITY});
+    tick(wet, &heard);
+    assert_false(same_hair());
+    for (int n = 0; n < 60; ++n)
+        tick(wet, &heard);
+    assert_memory_equal(heard.positions[0], other.positions[0], sizeof heard.positions[0]);
+    assert_true(heard.positions[1][7 * 3 + 1] > other.positions[1][7 * 3 + 1] + 1000);
+    daemon_destroy(wet);
+    daemon_destroy(dry);
+}
+
+static void an_unstable_tuning_is_refused_told_once_and_counted(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "shake");
+    Daemon* daemon = create(&options, &heard);
+    for (int n = 0; n < 60; ++n) {
+        if (n % 20 == 5)
+            send_tuning(daemon, (TuningMessage){.slot_count = 1024,
+                                                .set = TUNING_STIFFNESS | TUNING_DAMPING,
+                                                .stiffness_s2 = 9e5f,
+                                                .damping_per_s = 1});
+        tick(daemon, &heard);
+    }
+    assert_int_equal(heard.notices, 1);
+    assert_non_null(strstr(heard.notice, "stiffness_s2"));
+    assert_int_equal(daemon_status(daemon).rejected, 3);
+    assert_true(daemon_state_hash(daemon) == hash_of(1, 1)); // nothing of it was taken
+    daemon_destroy(daemon);
 }
 
 static void inputs_wait_for_the_tick_and_are_said_as_applied(void** state)
@@ -559,19 +738,43 @@ static void an_unknown_style_is_told_the_known_ones(void** state)
 static void bad_bytes_are_counted_and_noticed_once_a_kind(void** state)
 {
     (void)state;
-    const char* channels[] = {CHANNEL_POSE, CHANNEL_CHARACTER, CHANNEL_REQUEST, CHANNEL_STATUS,
-                              "ELSEWHERE"};
+    const char* channels[] = {CHANNEL_POSE,    CHANNEL_CHARACTER, CHANNEL_WIND, CHANNEL_TUNING,
+                              CHANNEL_REQUEST, CHANNEL_STATUS,    "ELSEWHERE"};
     DaemonOptions options = options_for(&heard, "bus");
     Daemon* daemon = create(&options, &heard);
     uint8_t bytes[700];
     memset(bytes, 0xa5, sizeof bytes);
-    for (int k = 0; k < 5; ++k)
+    for (int k = 0; k < 7; ++k)
         for (size_t size = 0; size < sizeof bytes; size += 7)
             daemon_receive(daemon, channels[k], bytes, size);
     tick(daemon, &heard);
-    assert_int_equal(heard.notices, 5);
-    assert_int_equal(daemon_status(daemon).rejected, 5 * 100);
+    assert_int_equal(heard.notices, 7);
+    assert_int_equal(daemon_status(daemon).rejected, 7 * 100);
     assert_int_equal(heard.applied, 0);
+    daemon_destroy(daemon);
+}
+
+static void lost_strands_are_put_back_told_once_and_counted(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "shake");
+    options.sim.stiffness_s2 = 1e6f;
+    options.sim.force = true;
+    options.sim.iterations = 0;
+    Daemon* daemon = create(&options, &heard);
+    for (int n = 0; n < 240; ++n) {
+        tick(daemon, &heard);
+        daemon_publish_background(daemon, 16667);
+    }
+    assert_int_equal(heard.notices, 1);
+    assert_non_null(strstr(heard.notice, "character 0"));
+    assert_in_range(daemon_status(daemon).quarantined, 65, 240 * 64);
+    assert_in_range(heard.status.quarantined, 64, daemon_status(daemon).quarantined);
+    int64_t before = daemon_status(daemon).quarantined;
+    send_character(daemon, 0, CHARACTER_REMOVE, "");
+    tick(daemon, &heard);
+    assert_int_equal(daemon_status(daemon).quarantined, before);
+    assert_int_equal(daemon_status(daemon).rejected, 0);
     daemon_destroy(daemon);
 }
 
@@ -625,6 +828,11 @@ static void steady_state_allocates_nothing(void** state)
             for (int n = 0; n < 90; ++n) {
                 if (n == 10) allocations = 0; // OpenMP's threads are there by now
                 send_pose_of(daemon, n / 60.0, 0.01 * n, 0.0, n / 20, POSE_CARRY);
+                send_wind(daemon, 0, 1024, vec3((float)(n % 9), 0, 0), 0.5f);
+                send_tuning(daemon, (TuningMessage){.slot_count = 1024,
+                                                    .set = TUNING_STIFFNESS | TUNING_PEARL_RADIUS,
+                                                    .stiffness_s2 = (float)(300 + n),
+                                                    .pearl_radius_m = 0.005f});
                 tick(daemon, &heard);
                 daemon_publish_background(daemon, 16667);
             }
@@ -708,9 +916,15 @@ int main(void)
         cmocka_unit_test(styles_are_sent_at_once_and_again_each_second),
         cmocka_unit_test(a_request_brings_the_parts_it_names),
         cmocka_unit_test(a_carry_leaves_the_hair_bit_equal),
+        cmocka_unit_test(a_jump_without_a_segment_is_carried_told_once_and_counted),
         cmocka_unit_test(a_reset_brings_hair_to_rest_and_a_fast_follow_does_not),
         cmocka_unit_test(frozen_hair_is_rigid_with_the_head_and_thaws_where_it_was),
         cmocka_unit_test(a_teleporting_motion_keeps_hair_at_rest),
+        cmocka_unit_test(a_gust_visibly_moves_long_hair_and_it_comes_back),
+        cmocka_unit_test(a_wind_blows_on_its_slots_until_it_is_over),
+        cmocka_unit_test(a_tuned_daemon_goes_on_as_one_that_was_made_so),
+        cmocka_unit_test(less_gravity_lifts_the_hair_of_its_slots_within_a_tick),
+        cmocka_unit_test(an_unstable_tuning_is_refused_told_once_and_counted),
         cmocka_unit_test(inputs_wait_for_the_tick_and_are_said_as_applied),
         cmocka_unit_test(a_flood_of_poses_keeps_the_newest),
         cmocka_unit_test(characters_come_and_go),
@@ -721,6 +935,7 @@ int main(void)
         cmocka_unit_test(a_simulation_that_no_character_could_have_is_refused_without_one),
         cmocka_unit_test(an_unknown_style_is_told_the_known_ones),
         cmocka_unit_test(bad_bytes_are_counted_and_noticed_once_a_kind),
+        cmocka_unit_test(lost_strands_are_put_back_told_once_and_counted),
         cmocka_unit_test(a_new_daemon_outbids_a_higher_epoch_once),
         cmocka_unit_test(steady_state_allocates_nothing),
         cmocka_unit_test(a_scene_says_styles_characters_and_physics),

@@ -71,7 +71,7 @@ static uint64_t hash_of_run(int threads, float pearl_radius_m)
     Sim* sim = sim_create(&d, &fault);
     if (sim == NULL) fail_msg("%s", fault.text);
     for (int tick = 0; tick < TICKS; ++tick) {
-        SimHead heads[4];
+        SimHead heads[4] = {0};
         for (int s = 0; s < 4; ++s)
             head_at(&heads[s], (tick * 4 + s + 1) / 240.0, 1.0 / 240.0);
         sim_step(sim, heads);
@@ -109,7 +109,14 @@ static void own_functions_agree_with_libm(void** state)
         assert_true(fabs(trig_cos(x) - cos(x)) < 1e-12);
         assert_true(fabs(trig_exp(x) / exp(x) - 1.0) < 1e-11);
         assert_true(fabs(trig_log(x + 20.001) - log(x + 20.001)) < 1e-12);
+        assert_true(fabs(trig_atan(x) - atan(x)) < 1e-12);
+        for (double y = -20.0; y < 20.0; y += 0.37)
+            assert_true(fabs(trig_atan2(y, x) - atan2(y, x)) < 1e-12);
     }
+    static const double axes[] = {-1.0, 0.0, 1.0};
+    for (int i = 0; i < 9; ++i)
+        assert_true(fabs(trig_atan2(axes[i / 3], axes[i % 3]) - atan2(axes[i / 3], axes[i % 3])) <
+                    1e-12);
 }
 
 int main(void)

@@ -12,6 +12,8 @@
 #include <hair_request_t.h>
 #include <hair_status_t.h>
 #include <hair_style_t.h>
+#include <hair_tuning_t.h>
+#include <hair_wind_t.h>
 
 #include <zlib.h>
 
@@ -33,8 +35,10 @@ static const Kind kinds[] = {
     {CHANNEL_STYLE, __hair_style_t_get_hash, 0},
     {CHANNEL_POSE, __hair_pose_t_get_hash, 79},
     {CHANNEL_CHARACTER, __hair_character_t_get_hash, 51},
+    {CHANNEL_WIND, __hair_wind_t_get_hash, 40},
+    {CHANNEL_TUNING, __hair_tuning_t_get_hash, 45},
     {CHANNEL_REQUEST, __hair_request_t_get_hash, 539},
-    {CHANNEL_STATUS, __hair_status_t_get_hash, 84},
+    {CHANNEL_STATUS, __hair_status_t_get_hash, 100},
 };
 #define KINDS (sizeof kinds / sizeof kinds[0])
 
@@ -136,6 +140,20 @@ static void send_wrong_numbers(Bus* bus)
     for (size_t at = 16; at + 8 <= size; at += 8) {
         memset(bytes + at, 0xff, 8); // not a number
         send_paced(bus, CHANNEL_POSE, bytes, size);
+    }
+    WindMessage wind = {.slot_count = 1024};
+    size = wind_encode(bytes, sizeof bytes, &wind);
+    assert_true(size > 0);
+    for (size_t at = 16; at + 4 <= size; at += 4) {
+        memset(bytes + at, 0xff, 4);
+        send_paced(bus, CHANNEL_WIND, bytes, size);
+    }
+    TuningMessage tuning = {.slot_count = 1024, .set = TUNING_EVERY};
+    for (size_t at = 16; at + 4 <= 45; at += 4) {
+        size = tuning_encode(bytes, sizeof bytes, &tuning);
+        assert_true(size > 0);
+        memset(bytes + at, 0xff, 4);
+        send_paced(bus, CHANNEL_TUNING, bytes, size);
     }
     StatusMessage status = {.epoch = 1};
     size = status_encode(bytes, sizeof bytes, &status);
@@ -256,8 +274,8 @@ static void server_and_client_live_through_hostile_messages(void** state)
     assert_true(rejected > 100);
     assert_int_equal(stats_integer(root, "epoch"), epoch);
     json_decref(root);
-    // One line a kind: four channels here, and damage of five kinds or a bad style part there.
-    if (process_complaints(&server) != 4) process_fail(&server, "not one line a channel");
+    // One line a kind: six channels here, and damage of five kinds or a bad style part there.
+    if (process_complaints(&server) != 6) process_fail(&server, "not one line a channel");
     if (process_lines(client.text[1]) > 6 || process_lines(client.text[1]) < 2)
         process_fail(&client, "not one line a kind");
     for (int kind = 1; kind <= FRAME_CRC; ++kind)

@@ -32,6 +32,52 @@ static void amplitudes_are_those_of_the_clips(void** state)
     assert_float_equal(largest_angle("run"), 0.08, 1e-4);
     assert_true(largest_angle("none") == 0.0);
     assert_float_equal(motion_find("run")->at(10.0).pose.position.z, 35.0, 1e-6);
+    assert_float_equal(largest_angle("flip"), 3.14159265, 1e-6);
+    assert_true(largest_angle("gust") == 0.0);
+}
+
+static void a_jump_stop_walks_stops_dead_jumps_and_lands_dead(void** state)
+{
+    (void)state;
+    MotionFunction at = motion_find("jump-stop")->at;
+    double highest = 0.0;
+    assert_float_equal(at(0.5).pose.position.z, 0.75, 1e-9);
+    for (double t = 1.0; t < 6.0; t += 0.01) {
+        assert_float_equal(at(t).pose.position.z, 1.5, 1e-9);
+        highest = fmax(highest, at(t).pose.position.y);
+        if (t < 3.0 || t > 3.62) assert_true(at(t).pose.position.y == 0.0);
+    }
+    assert_float_equal(highest, 0.4587, 1e-3);
+    assert_float_equal(at(7.0).pose.position.z, 3.0, 1e-9); // a loop goes on where it stopped
+}
+
+static void a_flip_holds_upside_down_and_goes_on_over(void** state)
+{
+    (void)state;
+    MotionFunction at = motion_find("flip")->at;
+    for (double t = 0.5; t < 3.5; t += 0.01)
+        assert_true(quat_rotate(at(t).pose.orientation, (Vec3d){0, 1, 0}).y < -0.999999);
+    for (double t = 4.0; t < 6.0; t += 0.01)
+        assert_true(angle(at(t).pose.orientation) == 0.0);
+    // Over by the face both times.
+    assert_true(quat_rotate(at(0.2).pose.orientation, (Vec3d){0, 0, 1}).y < -0.1);
+    assert_true(quat_rotate(at(3.7).pose.orientation, (Vec3d){0, 0, 1}).y > 0.1);
+}
+
+static void only_the_gust_blows_and_then_rests(void** state)
+{
+    (void)state;
+    for (const Motion* motion = motions; motion->name != NULL; ++motion) {
+        double most = 0.0;
+        for (int i = 0; motion->at != NULL && i < 8000; ++i) {
+            Vec3d wind = motion->at(i * 1e-3).wind;
+            assert_true(wind.y == 0.0 && wind.z == 0.0 && wind.x >= 0.0);
+            if (i % 4000 >= 1500) assert_true(wind.x == 0.0);
+            most = fmax(most, wind.x);
+        }
+        bool blows = strcmp(motion->name, "gust") == 0;
+        assert_true(blows ? most > 8.0 && most < 8.0 * 1.4 : most == 0.0);
+    }
 }
 
 static void positive_nods_look_down_first(void** state)
@@ -45,8 +91,8 @@ static void the_neck_stays_where_it_is(void** state)
 {
     (void)state;
     const Vec3d neck = {0, 0.066, 0};
-    const char* names[] = {"none", "nod", "shake", "turn"};
-    for (int k = 0; k < 4; ++k)
+    const char* names[] = {"none", "nod", "shake", "turn", "flip", "gust"};
+    for (int k = 0; k < 6; ++k)
         for (int i = 0; i < 400; ++i) {
             Pose pose = motion_find(names[k])->at(i * 0.01).pose;
             Vec3d at = vec3d_add(pose.position, quat_rotate(pose.orientation, neck));
@@ -96,11 +142,12 @@ static void clips_end_in_two_seconds_of_rest(void** state)
 static void names_are_found_and_others_are_not(void** state)
 {
     (void)state;
-    const char* names[] = {"none", "bus", "nod", "shake", "run", "turn", "teleport"};
-    for (int i = 0; i < 7; ++i)
+    const char* names[] = {"none", "bus",  "nod",  "shake",    "jump-stop",
+                           "run",  "flip", "turn", "teleport", "gust"};
+    for (int i = 0; i < 10; ++i)
         assert_string_equal(motion_find(names[i])->name, names[i]);
     assert_null(motion_find("bus")->at);
-    assert_null(motion_find("flip"));
+    assert_null(motion_find("hop"));
     assert_null(motion_find(""));
 }
 
@@ -108,6 +155,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(amplitudes_are_those_of_the_clips),
+        cmocka_unit_test(a_jump_stop_walks_stops_dead_jumps_and_lands_dead),
+        cmocka_unit_test(a_flip_holds_upside_down_and_goes_on_over),
+        cmocka_unit_test(only_the_gust_blows_and_then_rests),
         cmocka_unit_test(positive_nods_look_down_first),
         cmocka_unit_test(the_neck_stays_where_it_is),
         cmocka_unit_test(nothing_jumps_but_the_teleport),

@@ -1,6 +1,7 @@
 // The pose ring: linear motion exact, no comb at the source's rate, no jump whatever is lost.
 #include "messages/random.h"
 #include "messages/trig.h"
+#include "server/motion.h"
 #include "server/poses.h"
 #include "server/sim.h"
 
@@ -251,6 +252,122 @@ static void follow_into_a_segment_is_a_fast_motion(void** state)
     assert_true(largest < 0.5);
 }
 
+// A sway that jumps by 1 m within its segment at 2 s, `lost` messages there never heard.
+static void a_jump_within_a_segment_is_a_carry(void** state)
+{
+    (void)state;
+    for (int lost = 0; lost < 3; ++lost) {
+        PoseRing ring;
+        double largest = 0.0, last = 0.0;
+        poses_init(&ring, sway(0.0), TICK_S);
+        for (int tick = 0; tick < 240; ++tick) {
+            double now = tick * TICK_S;
+            Vec3d at = sway(now).position;
+            if (tick >= 120) at.x += 1.0;
+            PoseMessage message = pose_message(now, at, 1, POSE_FOLLOW);
+            bool jumps = false;
+            if (tick < 120 || tick >= 120 + lost) jumps = poses_push(&ring, &message, now);
+            assert_int_equal(jumps, tick == 120 + lost);
+            assert_int_equal(ring.pending, jumps || tick == 0);
+            if (jumps) assert_int_equal(ring.pending_verb, POSE_CARRY);
+            ring.pending = false;
+            for (int s = 0; s < 4; ++s) {
+                double x = poses_at(&ring, now + (s + 1) * TICK_S / 4).position.x;
+                if (tick >= 120 + lost) x -= 1.0;
+                if (tick > 100) largest = fmax(largest, fabs(x - last));
+                last = x;
+            }
+        }
+        assert_true(largest < 1.2 * TICK_S / 4 + 0.003 * (lost + 1));
+    }
+}
+
+static void a_turn_by_more_than_a_quarter_at_once_is_a_carry(void** state)
+{
+    (void)state;
+    for (int wide = 0; wide < 2; ++wide) {
+        PoseRing ring;
+        poses_init(&ring, pose_identity(), TICK_S);
+        for (int i = 0; i < 20; ++i) {
+            PoseMessage m = pose_message(i * TICK_S, (Vec3d){0, 0, 0}, 1, POSE_FOLLOW);
+            double yaw = i < 10 ? 0.0 : wide ? 1.7 : 1.4;
+            // Either of the two quaternions that a rotation has.
+            double sign = i % 2 ? 1.0 : -1.0;
+            m.pose.orientation =
+                (Quat){0, sign * trig_sin(0.5 * yaw), 0, sign * trig_cos(0.5 * yaw)};
+            ring.pending = false;
+            assert_int_equal(poses_push(&ring, &m, i * TICK_S), wide && i == 10);
+            if (wide && i == 10) assert_true(ring.pending && ring.pending_is_turned);
+        }
+    }
+}
+
+// 110 degrees an interval, from one interval to the next: a jump, and then a motion.
+static void a_steady_spin_is_one_jump_at_most(void** state)
+{
+    (void)state;
+    PoseRing ring;
+    int jumps = 0;
+    poses_init(&ring, pose_identity(), TICK_S);
+    for (int i = 0; i < 40; ++i) {
+        PoseMessage m = pose_message(i * TICK_S, (Vec3d){0, 0, 0}, 1, POSE_FOLLOW);
+        double yaw = i < 10 ? 0.0 : 1.92 * (i - 9), sign = i % 2 ? 1.0 : -1.0;
+        m.pose.orientation = (Quat){0, sign * trig_sin(0.5 * yaw), 0, sign * trig_cos(0.5 * yaw)};
+        jumps += poses_push(&ring, &m, i * TICK_S);
+    }
+    assert_int_equal(jumps, 1);
+}
+
+static int jumps_of(const char* motion, double rate_hz, int kept, int of)
+{
+    PoseRing ring;
+    int jumps = 0;
+    poses_init(&ring, pose_identity(), TICK_S);
+    for (int i = 0; i < 13.0 * rate_hz; ++i) {
+        double t = i / rate_hz;
+        PoseMessage m = pose_message(t, (Vec3d){0, 0, 0}, 1, POSE_FOLLOW);
+        m.pose = motion_find(motion)->at(t).pose;
+        if (i % of < kept) jumps += poses_push(&ring, &m, t);
+    }
+    return jumps;
+}
+
+static void no_clip_jumps_at_any_rate_or_loss_but_teleports(void** state)
+{
+    (void)state;
+    const char* const clips[] = {"none", "nod", "shake", "jump-stop", "run", "flip", "gust"};
+    const double rates[] = {20, 30, 60, 144};
+    for (int r = 0; r < 4; ++r) {
+        for (size_t k = 0; k < sizeof clips / sizeof clips[0]; ++k) {
+            assert_int_equal(jumps_of(clips[k], rates[r], 1, 1), 0);
+            assert_int_equal(jumps_of(clips[k], rates[r], (int)rates[r], 2 * (int)rates[r]), 0);
+            assert_int_equal(jumps_of(clips[k], rates[r], 2, 7), 0);
+        }
+        if (rates[r] > 36) assert_int_equal(jumps_of("turn", rates[r], 1, 1), 0);
+        assert_int_equal(jumps_of("teleport", rates[r], 1, 1), 6);
+    }
+}
+
+static void a_fast_car_and_its_brake_are_no_jumps(void** state)
+{
+    (void)state;
+    PoseRing ring;
+    double x = 0.0;
+    poses_init(&ring, pose_identity(), TICK_S);
+    for (int i = 0; i < 60; ++i) {
+        PoseMessage m = pose_message(i * 0.05, (Vec3d){x, 0, 0}, 1, POSE_FOLLOW);
+        assert_false(poses_push(&ring, &m, i * 0.05));
+        if (i < 40) x += 1.5; // 30 m/s
+    }
+    // Off at once at that speed: one jump, and then a motion again.
+    int jumps = 0;
+    for (int i = 60; i < 80; ++i) {
+        PoseMessage m = pose_message(i * 0.05, (Vec3d){x += 1.5, 0, 0}, 1, POSE_FOLLOW);
+        jumps += poses_push(&ring, &m, i * 0.05);
+    }
+    assert_int_equal(jumps, 1);
+}
+
 static void older_messages_are_ignored_and_restarted_senders_are_not(void** state)
 {
     (void)state;
@@ -362,6 +479,11 @@ int main(void)
         cmocka_unit_test(a_lost_carry_is_made_by_the_next_message_without_a_jump),
         cmocka_unit_test(verbs_are_reported_once_by_whichever_message_is_heard_first),
         cmocka_unit_test(follow_into_a_segment_is_a_fast_motion),
+        cmocka_unit_test(a_jump_within_a_segment_is_a_carry),
+        cmocka_unit_test(a_turn_by_more_than_a_quarter_at_once_is_a_carry),
+        cmocka_unit_test(a_steady_spin_is_one_jump_at_most),
+        cmocka_unit_test(no_clip_jumps_at_any_rate_or_loss_but_teleports),
+        cmocka_unit_test(a_fast_car_and_its_brake_are_no_jumps),
         cmocka_unit_test(older_messages_are_ignored_and_restarted_senders_are_not),
         cmocka_unit_test(a_slow_source_leaves_no_comb_in_tip_speed),
     };

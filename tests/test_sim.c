@@ -79,7 +79,7 @@ static void follow(Sim* sim, const char* motion, int first, int ticks, Vec3d off
     MotionFunction at = motion_find(motion)->at;
     double dt = 1.0 / 240.0;
     for (int tick = first; tick < first + ticks; ++tick) {
-        SimHead heads[4];
+        SimHead heads[4] = {0};
         for (int s = 0; s < 4; ++s) {
             double t = (tick * 4 + s + 1) * dt;
             Pose now = at(t).pose;

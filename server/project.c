@@ -1,47 +1,10 @@
-#include "server/length.h"
+#include "server/project.h"
 
 #include <math.h>
 
 #define REACH_PASSES    64
 #define REACH_TOLERANCE 5e-4f
 #define LEAST_LENGTH_M  1e-9f // below it a link has no direction
-// What float positions within a metre resolve of a length. Correcting less is correcting rounding:
-// the tip's spring is so soft (k dt^2 below 1e-3) that the pushes would add up to a drift of 0.01
-// mm at rest.
-#define RESOLVED_M 2.5e-7f
-
-void length_shares(float* inner, float* outer, bool inner_skinned, bool outer_skinned)
-{
-    *inner = inner_skinned ? 0.0f : outer_skinned ? 1.0f : 0.5f;
-    *outer = outer_skinned ? 0.0f : inner_skinned ? 1.0f : 0.5f;
-}
-
-LANES_KERNEL void length_correct(Block* block)
-{
-    for (int n = 1; n < block->nodes; ++n) {
-        Lanes3* a = &block->position[n - 1];
-        Lanes3* b = &block->position[n];
-        const float* rest = block->length[n].v;
-        const float* inner = block->inner_part[n].v;
-        const float* outer = block->outer_part[n].v;
-#pragma omp simd
-        for (int l = 0; l < LANES; ++l) {
-            float x = b->x[l] - a->x[l], y = b->y[l] - a->y[l], z = b->z[l] - a->z[l];
-            float d = sqrtf(x * x + y * y + z * z);
-            d = d > LEAST_LENGTH_M ? d : LEAST_LENGTH_M;
-            float error = d - rest[l];
-            error = fabsf(error) > RESOLVED_M ? error : 0.0f;
-            float excess = error / d;
-            float in = inner[l] * excess, out = outer[l] * excess;
-            a->x[l] += in * x;
-            a->y[l] += in * y;
-            a->z[l] += in * z;
-            b->x[l] -= out * x;
-            b->y[l] -= out * y;
-            b->z[l] -= out * z;
-        }
-    }
-}
 
 // `node` at `length` from `anchor`, on the side where it is.
 static Vec3 at_length(Vec3 anchor, Vec3 node, float length)
@@ -77,7 +40,7 @@ static void reach_between(Vec3* strand, int from, int to, const float* lengths)
     }
 }
 
-void length_project(Vec3* strand, int nodes, const float* lengths, const bool* skinned)
+void project_lengths(Vec3* strand, int nodes, const float* lengths, const bool* skinned)
 {
     int anchor = 0;
     for (int n = 1; n < nodes; ++n) {

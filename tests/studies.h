@@ -1,0 +1,17 @@
+// Studies of hair-bench: many runs of the solver, as one CSV each, for scripts/chart. A study has
+// columns of its own and says in comment lines (#) what it holds and where it was made.
+#pragma once
+
+#include "messages/base.h"
+
+typedef struct Study {
+    const char* name;
+    const char* help;
+    // Writes to standard output; false with a fault.
+    bool (*run)(Fault* fault);
+} Study;
+
+bool study_sim(Fault* fault);
+
+// "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.
+void study_machine(void);
