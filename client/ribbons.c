@@ -17,17 +17,17 @@
 // Where the scalp ends, hair does not begin at once: over the first RIM_M from the rim wisps are
 // narrow, and thin for the first FADE_M from their roots. A parting is a narrow line, so roots
 // there are nearly as full as elsewhere.
-#define RIM_M            0.012f
-#define FADE_M           0.016f
-#define PARTING_PRESENCE 0.9f
+#define RIM_M            0.007f
+#define FADE_M           0.010f
+#define PARTING_PRESENCE 1.0f
 
 // Some wisps stand along the rim, rooted up to STRAY_ROOT_M beyond it. Hair is younger there: they
 // are shorter than their guides, and some are very short.
-#define RIM_SHARE            0.18f // of the set's wisps
+#define RIM_SHARE            0.26f // of the set's wisps
 #define RIM_REACH            0.9f  // of their guides' length
-#define STRAY_ROOT_M         0.006f
+#define STRAY_ROOT_M         0.004f
 #define PARTING_STRAY_ROOT_M 0.0015f // keeps to its side
-#define SHORT_SHARE          0.35f   // of those at the hairline
+#define SHORT_SHARE          0.25f   // of those at the hairline
 #define SHORT_LEAST_M        0.010f
 #define SHORT_MOST_M         0.030f
 
@@ -193,8 +193,8 @@ static void shape_wisp(Strip* strip, const StrandSet* set, const Wisp* wisp)
         // Hair is densest where it grows: wisps are full at the root, so that little scalp shows.
         float fill =
             fmaxf(set->fibres * fibre_width_m(along) / width, 0.85f - 0.85f * leave(along));
-        strip->width_m[k] = width * (0.35f + 0.65f * here);
-        strip->fill[k] = fminf(fill, 1.0f) * (0.15f + 0.85f * here);
+        strip->width_m[k] = width * (0.6f + 0.4f * here);
+        strip->fill[k] = fminf(fill, 1.0f) * (0.5f + 0.5f * here);
     }
 }
 
