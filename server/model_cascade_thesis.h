@@ -20,20 +20,7 @@
 #pragma once
 
 #include "server/frames.h"
-
-static void cascade_thesis_weigh(Block* block, const Substep* substep)
-{
-    real gravity = (real)substep->gravity_m_s2;
-    for (int n = 0; n < block->nodes; ++n) {
-        Lanes3* a = &block->acceleration[n];
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            a->x[l] = 0;
-            a->y[l] = -gravity;
-            a->z[l] = 0;
-        }
-    }
-}
+#include "server/model_plain.h"
 
 // The space of link n: N in direction[n], B in predicted[n], and T in place of the T before.
 static inline void cascade_thesis_space(Block* block, int n, Lanes3* t)
@@ -90,7 +77,7 @@ static void cascade_thesis_accelerate(Block* block, const Substep* substep)
 {
     Lanes3 t;
     frames_of_head(&block->across[1], substep->rotation, &t);
-    cascade_thesis_weigh(block, substep);
+    plain_accelerate(block, substep);
     cascade_thesis_root(block);
     for (int n = 1; n < block->nodes; ++n) {
         frames_direction(block, n, &block->direction[n]);
