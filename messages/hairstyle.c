@@ -120,6 +120,14 @@ static bool near_head(Vec3 p)
            in_range(p.z, -FARTHEST_M, FARTHEST_M);
 }
 
+static bool check_collider(const Collider* c, int number, Fault* fault)
+{
+    if (!near_head(c->from) || !near_head(c->to) || !in_range(c->radius, 0.0f, FARTHEST_M))
+        return fault_set(fault, "collider %d: ends and radius must be finite", number);
+    return (c->body >= 0 && c->body < BODY_COUNT) ||
+           fault_set(fault, "collider %d: body %d: 0 the head, 1 the torso", number, c->body);
+}
+
 static bool is_reflectance(Vec3 c)
 {
     return in_range(c.x, 0.0f, 1.0f) && in_range(c.y, 0.0f, 1.0f) && in_range(c.z, 0.0f, 1.0f);
@@ -173,9 +181,7 @@ static bool check_look(const Hairstyle* style, Fault* fault)
         return fault_set(fault, "%d colliders: at most %d", style->collider_count,
                          HAIRSTYLE_MAX_COLLIDERS);
     for (int i = 0; i < style->collider_count; ++i)
-        if (!near_head(style->colliders[i].centre) ||
-            !in_range(style->colliders[i].radius, 0.0f, FARTHEST_M))
-            return fault_set(fault, "collider %d: centre and radius must be finite", i);
+        if (!check_collider(&style->colliders[i], i, fault)) return false;
     const HairMaterial* m = &style->material;
     if (!is_reflectance(m->root_colour) || !is_reflectance(m->tip_colour) ||
         !is_reflectance(m->skin_colour))

@@ -97,7 +97,7 @@ typedef struct Hairstyle {
     int triangle_count;
     ScalpTriangle* triangles;
     int collider_count;
-    Sphere colliders[HAIRSTYLE_MAX_COLLIDERS];
+    Collider colliders[HAIRSTYLE_MAX_COLLIDERS];
     HairMaterial material;
     int head_kind;    // HeadKind
     Vec3 head_centre; // half-way between chin and crown: what cameras orbit

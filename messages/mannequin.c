@@ -322,12 +322,17 @@ static const Sphere COLLIDERS[] = {
     {{-0.1063f, -0.0316f, -0.0392f}, 0.0520f},
 };
 
-int mannequin_colliders(Sphere* spheres, int capacity)
+#define FIRST_OF_TORSO 7 // of COLLIDERS; those before turn with the head
+
+int mannequin_colliders(Collider* colliders, int capacity)
 {
     int count = (int)(sizeof COLLIDERS / sizeof COLLIDERS[0]);
     count = count < capacity ? count : capacity;
     if (count <= 0) return 0;
-    memcpy(spheres, COLLIDERS, (size_t)count * sizeof *spheres);
+    for (int i = 0; i < count; ++i) {
+        colliders[i] = collider_sphere(COLLIDERS[i]);
+        colliders[i].body = i < FIRST_OF_TORSO ? BODY_HEAD : BODY_TORSO;
+    }
     return count;
 }
 

@@ -22,8 +22,10 @@ Vec3 mannequin_project(Vec3 point, float lift_m);
 // over the hairline.
 float mannequin_scalp(Vec3 surface);
 
-// Spheres inside the head, neck and shoulders for collision; returns how many (<= capacity).
-int mannequin_colliders(Sphere* spheres, int capacity);
+// Spheres inside the head, neck and shoulders for collision, the last of the torso; returns how
+// many
+// (<= capacity).
+int mannequin_colliders(Collider* colliders, int capacity);
 
 // Triangulates the surface; about 19,000 vertices, close over eyes, lips and ears; positions on the
 // surface, normals its gradient.

@@ -118,8 +118,10 @@ static void carry_tables(Cursor* cursor, Hairstyle* style)
     for (int i = 0; i < style->set_count; ++i)
         carry_set(cursor, &style->sets[i]);
     for (int i = 0; i < style->collider_count; ++i) {
-        carry_vec3(cursor, &style->colliders[i].centre);
+        carry_vec3(cursor, &style->colliders[i].from);
+        carry_vec3(cursor, &style->colliders[i].to);
         carry_bytes(cursor, &style->colliders[i].radius, 4);
+        carry_int(cursor, &style->colliders[i].body);
     }
     for (int i = 0; i < style->triangle_count; ++i)
         carry_bytes(cursor, style->triangles[i].guide, 6);

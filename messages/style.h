@@ -12,7 +12,7 @@
 #define STYLE_BULK_MAX_BYTES (4 * 1024 * 1024)
 #define STYLE_MAX_PARTS      4096
 #define STYLE_HEADER_BYTES   56 // of a style_t message: see messages/README.md
-#define STYLE_FORMAT         1
+#define STYLE_FORMAT         2
 
 typedef enum StyleLane { STYLE_FAST = 0, STYLE_BULK = 1, STYLE_LANES = 2 } StyleLane;
 

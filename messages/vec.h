@@ -38,6 +38,22 @@ typedef struct Sphere {
     float radius;
 } Sphere;
 
+// What hair collides with: the sphere of `radius` swept along a line, its axis. A sphere where both
+// ends are the same.
+typedef struct Collider {
+    Vec3 from, to; // of the axis, head space while the body is straight, m
+    float radius;  // m
+    int body;      // ColliderBody
+} Collider;
+
+// What a collider moves with.
+typedef enum ColliderBody { BODY_HEAD, BODY_TORSO, BODY_COUNT } ColliderBody;
+
+static inline Collider collider_sphere(Sphere sphere)
+{
+    return (Collider){sphere.centre, sphere.centre, sphere.radius, BODY_HEAD};
+}
+
 static inline Vec3 vec3(float x, float y, float z)
 {
     return (Vec3){x, y, z};

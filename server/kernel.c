@@ -14,9 +14,11 @@
 
 #include "server/air.h"
 #include "server/collide.h"
+#include "server/collide_links.h"
 #include "server/frames.h"
 #include "server/integrate.h"
 #include "server/length.h"
+#include "server/length_direct.h"
 #include "server/model_cascade.h"
 #include "server/model_cascade_thesis.h"
 #include "server/model_forest.h"
@@ -54,9 +56,12 @@ static void substep(Block* blocks, int count, const Substep* s, const Stages* mo
         model->integrate(&blocks[b], s);
         shape_blend(&blocks[b]);
     }
-    if (!model->keeps_lengths) length_correct(blocks, count, s->iterations);
-    for (int b = 0; b < count; ++b)
-        collide_spheres(&blocks[b], s);
+    if (!model->keeps_lengths && s->solve_directly) length_solve(blocks, count, s->iterations);
+    if (!model->keeps_lengths && !s->solve_directly) length_correct(blocks, count, s->iterations);
+    for (int b = 0; b < count; ++b) {
+        collide_nodes(&blocks[b], s);
+        if (s->collide_links) collide_links(&blocks[b], s);
+    }
 }
 
 static void step(Block* blocks, int count, const Substep* substeps, int substep_count)

@@ -593,8 +593,10 @@ static bool load_head(Hairstyle* style, Groom* groom, const Notice* notice, Faul
     check_size(&skin, "the head", notice);
     style->head_centre = box_middle(&skin);
     style->head_centre.y = skin.high.y - (float)LOAD_HALF_HEAD_M;
-    style->collider_count =
-        fit_spheres(style->colliders, FIT_SPHERES, &style->head, &groom->covered);
+    Sphere spheres[FIT_SPHERES];
+    style->collider_count = fit_spheres(spheres, FIT_SPHERES, &style->head, &groom->covered);
+    for (int i = 0; i < style->collider_count; ++i)
+        style->colliders[i] = collider_sphere(spheres[i]);
     return true;
 }
 
@@ -700,6 +702,16 @@ static void print_set(const Hairstyle* style, const StrandSet* set)
            1000.0 * length, pinned ? "fixed (both ends)" : "free");
 }
 
+static void print_collider(int number, const Collider* c)
+{
+    bool is_sphere = memcmp(&c->from, &c->to, sizeof c->from) == 0;
+    printf("  %s %2d at %7.4f %7.4f %7.4f m", is_sphere ? "sphere" : "capsule", number,
+           (double)c->from.x, (double)c->from.y, (double)c->from.z);
+    if (!is_sphere)
+        printf(" to %7.4f %7.4f %7.4f m", (double)c->to.x, (double)c->to.y, (double)c->to.z);
+    printf(", radius %.4f m%s\n", (double)c->radius, c->body == BODY_TORSO ? ", of the torso" : "");
+}
+
 static bool print_style(const Hairstyle* style, float covered, Fault* fault)
 {
     static const char* const heads[] = {"none", "mannequin", "mesh"};
@@ -721,9 +733,7 @@ static bool print_style(const Hairstyle* style, float covered, Fault* fault)
     if (covered > 0.0f) printf(", covering %.0f %% of the head's inside", 100.0 * (double)covered);
     printf("\n");
     for (int i = 0; i < style->collider_count; ++i)
-        printf("  sphere %2d at %7.4f %7.4f %7.4f m, radius %.4f m\n", i,
-               (double)style->colliders[i].centre.x, (double)style->colliders[i].centre.y,
-               (double)style->colliders[i].centre.z, (double)style->colliders[i].radius);
+        print_collider(i, &style->colliders[i]);
     StyleBytes bytes = {0};
     if (!style_encode(&bytes, style, fault)) return false;
     printf("lanes fast %zu bytes, bulk %zu bytes\n", bytes.size[STYLE_FAST],

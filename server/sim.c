@@ -6,6 +6,7 @@
 #include "server/models.h"
 #include "server/printed.h"
 #include "server/project.h"
+#include "server/span.h"
 #include "server/strands.h"
 
 #include <math.h>
@@ -33,6 +34,7 @@ SimDefinition sim_default(void)
                            .drag_per_s = 1.0f,
                            .joint_damping_per_s = 60.0f,
                            .down_share = 0.05f,
+                           .collide = COLLIDE_PEARL,
                            .pearl_radius_m = 0.006f,
                            .gravity_compensation = true,
                            .tip_mass = 1.0f,
@@ -52,9 +54,21 @@ static bool check_rest(const SimDefinition* d, Fault* fault)
         if (!vec3_finite(d->rest[i]))
             return fault_set(fault, "simulation: rest node %d of strand %d is not finite",
                              i % d->nodes, i / d->nodes);
-    for (int k = 0; k < d->collider_count; ++k)
-        if (!vec3_finite(d->colliders[k].centre) || !(d->colliders[k].radius >= 0.0f))
-            return fault_set(fault, "simulation: collider %d is not a sphere", k);
+    return true;
+}
+
+static bool check_colliders(const SimDefinition* d, Fault* fault)
+{
+    if ((int)d->length < 0 || d->length >= LENGTH_COUNT)
+        return fault_set(fault, "simulation: length stage %d is unknown", (int)d->length);
+    if ((int)d->collide < 0 || d->collide >= COLLIDE_COUNT)
+        return fault_set(fault, "simulation: collide %d is unknown", (int)d->collide);
+    for (int k = 0; k < d->collider_count; ++k) {
+        const Collider* c = &d->colliders[k];
+        if (!vec3_finite(c->from) || !vec3_finite(c->to) || !(c->radius >= 0.0f) || c->body < 0 ||
+            c->body >= BODY_COUNT)
+            return fault_set(fault, "simulation: collider %d is neither sphere nor capsule", k);
+    }
     return true;
 }
 
@@ -114,7 +128,8 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
            in_range(d->fall_off_power, 0, 3, "fall_off_power", fault) &&
-           in_range(d->threads, 1, 256, "threads", fault) && check_rest(d, fault);
+           in_range(d->threads, 1, 256, "threads", fault) && check_rest(d, fault) &&
+           check_colliders(d, fault);
 }
 
 // Cuts `count` entries of `size` off the arena; sizes are multiples of 64, so all stay aligned.
@@ -125,10 +140,16 @@ static void* cut(char** arena, size_t count, size_t size)
     return piece;
 }
 
+// Of nodes, and of links where those collide.
+static size_t clearances(const SimDefinition* d)
+{
+    return (size_t)d->collider_count * (d->collide == COLLIDE_SEGMENT ? 2 : 1);
+}
+
 static size_t block_bytes(const SimDefinition* d)
 {
-    return (size_t)d->nodes * (14 * sizeof(Lanes3) + 3 * sizeof(Angles) +
-                               (8 + (size_t)d->collider_count) * sizeof(Lanes)) +
+    return (size_t)d->nodes *
+               (14 * sizeof(Lanes3) + 3 * sizeof(Angles) + (11 + clearances(d)) * sizeof(Lanes)) +
            sizeof(Lanes3);
 }
 
@@ -147,7 +168,8 @@ static void cut_block(Block* block, const SimDefinition* d, char* arena)
                          &block->mass,   &block->outer_part, &block->inner_part};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i)
         *numbers[i] = cut(&arena, nodes, sizeof(Lanes));
-    block->clearance = cut(&arena, nodes * (size_t)d->collider_count, sizeof(Lanes));
+    block->clearance = cut(&arena, nodes * clearances(d), sizeof(Lanes));
+    block->clearance_of_link = block->clearance + d->collider_count * d->nodes;
     // Last, so that they lie in nobody else's way.
     Lanes3** places[] = {&block->upward, &block->downward};
     for (size_t i = 0; i < sizeof places / sizeof places[0]; ++i)
@@ -155,7 +177,9 @@ static void cut_block(Block* block, const SimDefinition* d, char* arena)
     Angles** angles[] = {&block->angle, &block->rate, &block->rest_angle};
     for (size_t i = 0; i < sizeof angles / sizeof angles[0]; ++i)
         *angles[i] = cut(&arena, nodes, sizeof(Angles));
-    block->friction = cut(&arena, nodes, sizeof(Lanes));
+    Lanes** others[] = {&block->friction, &block->inverse_mass, &block->pivot, &block->tension};
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i)
+        *others[i] = cut(&arena, nodes, sizeof(Lanes));
 }
 
 static float weight_of(const SimDefinition* d, int strand, int node)
@@ -178,12 +202,26 @@ static float keep_of(const SimDefinition* d, float weight)
     return (float)trig_pow((double)weight, 60.0 / (d->rate_hz * d->substeps));
 }
 
-// How near a node may come to a collider's centre: the sphere's radius plus the pearl's, but never
+// How near a node may come to a collider's axis: the collider's radius plus the pearl's, but never
 // more than its distance at rest: a groom whose rest pose dips into the head keeps its rest pose
-// instead of being blown off it.
-static float clearance_of(const SimDefinition* d, Sphere collider, Vec3 rest)
+// instead of being blown off it. So with links.
+static float clearance_at(const SimDefinition* d, const Collider* collider, float distance_at_rest)
 {
-    return fminf(collider.radius + d->pearl_radius_m, vec3_length(vec3_sub(rest, collider.centre)));
+    float pearl = d->collide == COLLIDE_POINT ? 0.0f : d->pearl_radius_m;
+    return fminf(collider->radius + pearl, distance_at_rest);
+}
+
+static void fill_clearance(Block* block, const SimDefinition* d, const Vec3* rest, int lane, int n)
+{
+    for (int k = 0; k < d->collider_count; ++k) {
+        const Collider* c = &d->colliders[k];
+        Span axis = {c->from, c->to}, link = {rest[n - (n > 0)], rest[n]};
+        int at = k * d->nodes + n;
+        block->clearance[at].v[lane] = (real)clearance_at(d, c, span_to_point(axis, rest[n]));
+        if (d->collide == COLLIDE_SEGMENT)
+            block->clearance_of_link[at].v[lane] =
+                (real)clearance_at(d, c, span_to_span(axis, link));
+    }
 }
 
 static Vec3 link_of(const Vec3* rest, int n)
@@ -199,13 +237,17 @@ static float reach_of(const Vec3* rest, int n)
     return from_root;
 }
 
+static double inverse_mass(const SimDefinition* d, int strand, int n)
+{
+    return weight_of(d, strand, n) == 0.0f ? 0.0 : 1.0 / mass_of(d, n);
+}
+
 // How a link's error is shared between its ends (thesis 4.2 with the sign that pulls a stretched
 // link together): by inverse mass, all at the free end where the other is skinned, none between
 // skinned ones.
 static void fill_shares(Block* block, const SimDefinition* d, int strand, int lane, int n)
 {
-    double inner = weight_of(d, strand, n - 1) == 0.0f ? 0.0 : 1.0 / mass_of(d, n - 1);
-    double outer = weight_of(d, strand, n) == 0.0f ? 0.0 : 1.0 / mass_of(d, n);
+    double inner = inverse_mass(d, strand, n - 1), outer = inverse_mass(d, strand, n);
     double sum = inner + outer > 0.0 ? inner + outer : 1.0;
     block->inner_part[n].v[lane] = (real)(inner / sum);
     block->outer_part[n].v[lane] = (real)(outer / sum);
@@ -227,9 +269,7 @@ static void fill_hinge(Block* block, const SimDefinition* d, const Vec3* rest, i
 static void fill_tuned(Block* block, const SimDefinition* d, const Vec3* rest, int lane)
 {
     for (int n = 0; n < d->nodes; ++n) {
-        for (int k = 0; k < d->collider_count; ++k)
-            block->clearance[k * d->nodes + n].v[lane] =
-                (real)clearance_of(d, d->colliders[k], rest[n]);
+        fill_clearance(block, d, rest, lane, n);
         block->stiffness[n].v[lane] = (real)model_stiffness(d, reach_of(rest, n));
         if (n > 0) fill_hinge(block, d, rest, lane, n);
     }
@@ -241,6 +281,7 @@ static void fill_node(Block* block, const SimDefinition* d, int strand, int lane
     lane_set(&block->rest[n], lane, rest[n]);
     block->keep[n].v[lane] = (real)keep_of(d, weight_of(d, strand, n));
     block->mass[n].v[lane] = (real)mass_of(d, n);
+    block->inverse_mass[n].v[lane] = (real)inverse_mass(d, strand, n);
     if (n == 0) return;
     block->length[n].v[lane] = (real)vec3_length(link_of(rest, n));
     fill_shares(block, d, strand, lane, n);
@@ -327,6 +368,8 @@ static void fill_substeps(Sim* sim)
                       .velocity_kept = (float)trig_exp(-(double)d->damping_per_s * dt),
                       .gravity_m_s2 = gravity,
                       .iterations = d->iterations,
+                      .solve_directly = d->length == LENGTH_DIRECT,
+                      .collide_links = d->collide == COLLIDE_SEGMENT,
                       .collider_count = d->collider_count};
 }
 
@@ -338,8 +381,8 @@ static bool allocate(Sim* sim, const SimDefinition* d)
     sim->memory = aligned_alloc(64, (size_t)sim->block_count * block_bytes(d));
     sim->substeps = calloc((size_t)d->substeps, sizeof *sim->substeps);
     sim->colliders = calloc(colliders + 1, sizeof *sim->colliders);
-    sim->centres = calloc(2 * colliders * (size_t)d->substeps + 1, sizeof *sim->centres);
-    return sim->blocks && sim->memory && sim->substeps && sim->colliders && sim->centres;
+    sim->axes = calloc(colliders * (size_t)d->substeps + 1, sizeof *sim->axes);
+    return sim->blocks && sim->memory && sim->substeps && sim->colliders && sim->axes;
 }
 
 static void fill(Sim* sim, const SimDefinition* d)
@@ -382,7 +425,7 @@ void sim_destroy(Sim* sim)
     free(sim->memory);
     free(sim->substeps);
     free(sim->colliders);
-    free(sim->centres);
+    free(sim->axes);
     free(sim);
 }
 
@@ -430,7 +473,10 @@ static void place(Block* block, const float rotation[9])
 
 void sim_reset(Sim* sim, const float rotation[9])
 {
-    memcpy(sim->rotation, rotation, sizeof sim->rotation);
+    for (int i = 0; i < BODY_COUNT; ++i) {
+        memcpy(sim->bodies[i].rotation, rotation, sizeof sim->bodies[i].rotation);
+        sim->bodies[i].offset = vec3(0, 0, 0);
+    }
     for (int b = 0; b < sim->block_count; ++b) {
         Block* block = &sim->blocks[b];
         place(block, rotation);
@@ -440,6 +486,17 @@ void sim_reset(Sim* sim, const float rotation[9])
         memset(block->angle, 0, (size_t)block->nodes * sizeof(Angles));
         memset(block->rate, 0, (size_t)block->nodes * sizeof(Angles));
     }
+}
+
+static void turn_body(Body* body, const float turn[9])
+{
+    float turned[9];
+    for (int i = 0; i < 9; ++i)
+        turned[i] = turn[i / 3 * 3] * body->rotation[i % 3] +
+                    turn[i / 3 * 3 + 1] * body->rotation[i % 3 + 3] +
+                    turn[i / 3 * 3 + 2] * body->rotation[i % 3 + 6];
+    memcpy(body->rotation, turned, sizeof turned);
+    body->offset = rotate(turn, body->offset);
 }
 
 void sim_turn(Sim* sim, const float turn[9])
@@ -452,12 +509,8 @@ void sim_turn(Sim* sim, const float turn[9])
                 lane_set(&block->previous[n], l, rotate(turn, lane_get(&block->previous[n], l)));
             }
     }
-    float turned[9];
-    for (int i = 0; i < 9; ++i)
-        turned[i] = turn[i / 3 * 3] * sim->rotation[i % 3] +
-                    turn[i / 3 * 3 + 1] * sim->rotation[i % 3 + 3] +
-                    turn[i / 3 * 3 + 2] * sim->rotation[i % 3 + 6];
-    memcpy(sim->rotation, turned, sizeof turned);
+    for (int i = 0; i < BODY_COUNT; ++i)
+        turn_body(&sim->bodies[i], turn);
 }
 
 // A skinned node is where it is at rest, to the bit; turning it forth and back would round.

@@ -26,6 +26,21 @@ typedef enum ModelKind {
     MODEL_COUNT
 } ModelKind;
 
+// What of a strand is kept out of colliders (Nguyen and Donnelly 2005, 23.2.2).
+typedef enum CollideMode {
+    COLLIDE_POINT,   // its nodes
+    COLLIDE_PEARL,   // ... as spheres of pearl_radius_m
+    COLLIDE_SEGMENT, // ... and the links between them, as thick
+    COLLIDE_COUNT
+} CollideMode;
+
+// How links are kept at their length within a substep; the forest models need neither.
+typedef enum LengthStage {
+    LENGTH_SWEEPS, // one link after another, `iterations` times (thesis 4.2)
+    LENGTH_DIRECT, // all links of a strand at once, `iterations` times (Han and Harada 2013)
+    LENGTH_COUNT
+} LengthStage;
+
 // What is simulated and how. Start from sim_default().
 typedef struct SimDefinition {
     ModelKind model;
@@ -34,11 +49,13 @@ typedef struct SimDefinition {
     const Vec3* rest;   // [strand][node], head space, m; copied
     const uint8_t*
         weight; // [strand][node], 255 physics ... 0 skinned; NULL: all physics but node 0
-    const Sphere* colliders; // head space; copied
+    const Collider* colliders; // copied
     int collider_count;
-    double rate_hz;     // ticks a second
-    int substeps;       // of a tick
-    int iterations;     // length-correction sweeps a substep
+    CollideMode collide;
+    double rate_hz; // ticks a second
+    int substeps;   // of a tick
+    int iterations; // of the length stage, a substep
+    LengthStage length;
     float gravity_m_s2; // along -Y
     // k/m, 1/s^2: of the first node's spring to its rest place (spring), or across the first joint,
     // EI / (m d^3) (the others).
@@ -50,7 +67,7 @@ typedef struct SimDefinition {
     float drag_per_s;          // where a wind blows, velocity relative to it decays as exp(-drag t)
     float joint_damping_per_s; // forest-z: v/J of a joint, J = m d^2 (thesis 4.2.2)
     float down_share;          // cascade-thesis: the downward springs' part of the upward ones' k
-    float pearl_radius_m;      // every node collides as a sphere of this radius (Nalu 23.2.2)
+    float pearl_radius_m;      // how thick a strand is where it collides
     // Rest is equilibrium under gravity: at every tilt (spring, cascade-thesis, forest-z: gravity
     // is left out), untilted (cascade, forest: the joints carry the weight), not at all (plain).
     bool gravity_compensation;
@@ -74,6 +91,11 @@ typedef struct SimHead {
     // Velocity of the air, world axes, m/s. Without a wind there is no drag: damping stands for
     // still air. Drag comes in over the first m/s, so that a breeze is no jolt.
     Vec3 wind;
+    // Where the torso is that the colliders of BODY_TORSO move with. Without one they move with the
+    // head.
+    bool has_torso;
+    float torso_rotation[9]; // row-major: world = rotation * torso
+    Vec3 torso_offset;       // of its origin from the head's, world axes, m
 } SimHead;
 
 // Takes stiffness, damping, gravity, drag, iterations and pearl radius from `wanted`, from the next

@@ -15,24 +15,50 @@ static void meet_air(const SimDefinition* definition, Substep* substep, const Si
     substep->air_move = vec3_sub(vec3_scale(head->wind, substep->dt), head->move);
 }
 
+static Vec3 place(const Body* body, Vec3 point)
+{
+    return vec3_add(rotate(body->rotation, point), body->offset);
+}
+
+static Axis axis_of(const Collider* c, const Body* before, const Body* now)
+{
+    Vec3 from = place(now, c->from), was = place(before, c->from);
+    Axis axis = {.from = from, .from_move = vec3_sub(from, was)};
+    if (memcmp(&c->from, &c->to, sizeof c->from) == 0) return axis;
+    Vec3 then = vec3_sub(place(before, c->to), was);
+    axis.along = vec3_sub(place(now, c->to), from);
+    axis.along_move = vec3_sub(axis.along, then);
+    float square = vec3_dot(axis.along, axis.along);
+    axis.inverse2 = square > LEAST_LENGTH_M * LEAST_LENGTH_M ? 1.0f / square : 0.0f;
+    return axis;
+}
+
+static void place_colliders(Sim* sim, Axis* axes, const SimHead* head)
+{
+    Body now[BODY_COUNT] = {0};
+    memcpy(now[BODY_HEAD].rotation, head->rotation, sizeof head->rotation);
+    now[BODY_TORSO] = now[BODY_HEAD];
+    if (head->has_torso) {
+        memcpy(now[BODY_TORSO].rotation, head->torso_rotation, sizeof head->torso_rotation);
+        now[BODY_TORSO].offset = head->torso_offset;
+    }
+    for (int k = 0; k < sim->definition.collider_count; ++k) {
+        int body = sim->colliders[k].body;
+        axes[k] = axis_of(&sim->colliders[k], &sim->bodies[body], &now[body]);
+    }
+    memcpy(sim->bodies, now, sizeof now);
+}
+
 // The parts of the substeps that the head's motion decides, and the wind.
 static void prepare_substeps(Sim* sim, const SimHead* heads)
 {
-    int colliders = sim->definition.collider_count;
     for (int s = 0; s < sim->definition.substeps; ++s) {
         Substep* substep = &sim->substeps[s];
         memcpy(substep->rotation, heads[s].rotation, sizeof substep->rotation);
         substep->second_difference = heads[s].second_difference;
         meet_air(&sim->definition, substep, &heads[s]);
-        Vec3* centre = sim->centres + 2 * colliders * s;
-        Vec3* move = centre + colliders;
-        for (int k = 0; k < colliders; ++k) {
-            centre[k] = rotate(heads[s].rotation, sim->colliders[k].centre);
-            move[k] = vec3_sub(centre[k], rotate(sim->rotation, sim->colliders[k].centre));
-        }
-        substep->centre = centre;
-        substep->centre_move = move;
-        memcpy(sim->rotation, heads[s].rotation, sizeof sim->rotation);
+        substep->axis = sim->axes + sim->definition.collider_count * s;
+        place_colliders(sim, sim->axes + sim->definition.collider_count * s, &heads[s]);
     }
 }
 

@@ -63,26 +63,43 @@ struct Block {
     Lanes3* acceleration; // m/s^2; of a link's direction, 1/s^2, in the forest models
     Lanes3* direction;    // of link n, unit
     Lanes3* predicted;    // where link n would point if its joint were at rest, unit
+    Lanes* pivot;         // length_direct: of row n of the elimination, inverse
+    Lanes* tension;       // ... and how much is pulled along link n, m
     Lanes3* moment;       // of joint n on link n, m^2/s^2; one more, past the tip, is zero
     // Constants.
-    Lanes3* rest;      // head space, m
-    Lanes3* along;     // rest direction of link n in the frame of link n - 1
-    Lanes3* across;    // its frame's second axis, in the same frame (frames.h)
-    Lanes3* carried;   // what joint n holds of the weight outboard at rest, in that frame, m^2/s^2
-    Lanes* length;     // m
-    Lanes* keep;       // what one substep leaves of the distance to the reference: 0 skinned
-    Lanes* stiffness;  // k/m, 1/s^2
-    Lanes* hinge;      // k/m times the square of the length between the middles of links, m^2/s^2
-    Lanes* mass;       // of the node, in masses of an inner node
-    Lanes* outer_part; // of a link's error corrected at node n
-    Lanes* inner_part; // ... and at node n - 1
-    Lanes* clearance;  // [collider][node]: least distance to the centre, m
+    Lanes3* rest;     // head space, m
+    Lanes3* along;    // rest direction of link n in the frame of link n - 1
+    Lanes3* across;   // its frame's second axis, in the same frame (frames.h)
+    Lanes3* carried;  // what joint n holds of the weight outboard at rest, in that frame, m^2/s^2
+    Lanes* length;    // m
+    Lanes* keep;      // what one substep leaves of the distance to the reference: 0 skinned
+    Lanes* stiffness; // k/m, 1/s^2
+    Lanes* hinge;     // k/m times the square of the length between the middles of links, m^2/s^2
+    Lanes* mass;      // of the node, in masses of an inner node
+    Lanes* inverse_mass;      // 0 of a skinned node
+    Lanes* outer_part;        // of a link's error corrected at node n
+    Lanes* inner_part;        // ... and at node n - 1
+    Lanes* clearance;         // [collider][node]: least distance to the axis, m
+    Lanes* clearance_of_link; // ... of link n; COLLIDE_SEGMENT alone
     // Of the printed models alone; forest-z has its y and x axes in predicted and moment.
     Lanes3* upward;     // cascade-thesis: node n at rest in the space of link n - 1, m (printed.c)
     Lanes3* downward;   // ... and in that of link n + 2
     Angles* rest_angle; // forest-z: of joint n at rest
     Lanes* friction;    // forest-z: v of joint n over the mass of a node, m^2/s
 };
+
+// Of a collider in a substep; world axes, relative to the head's position.
+typedef struct Axis {
+    Vec3 from, along;           // m; along is zero of a sphere
+    float inverse2;             // of along's square, 1/m^2; 0 of a sphere
+    Vec3 from_move, along_move; // since the substep before, m
+} Axis;
+
+// Where what colliders are fixed to is, relative to the head's position.
+typedef struct Body {
+    float rotation[9]; // row-major: world = rotation * body
+    Vec3 offset;       // m
+} Body;
 
 // What one substep needs besides the block.
 struct Substep {
@@ -96,11 +113,12 @@ struct Substep {
     Vec3 air_move;          // of the air past the head, m
     int model;              // ModelKind
     int iterations;
-    bool outermost;   // forest: the head's acceleration acts on the tips alone
-    float down_share; // cascade-thesis
+    bool outermost;      // forest: the head's acceleration acts on the tips alone
+    float down_share;    // cascade-thesis
+    bool solve_directly; // lengths
+    bool collide_links;
     int collider_count;
-    const Vec3* centre;      // of each collider now, world axes
-    const Vec3* centre_move; // since the substep before
+    const Axis* axis; // of each collider
 };
 
 struct Sim {
@@ -109,11 +127,11 @@ struct Sim {
     float gravity_at_rest; // m/s^2: what the rest pose was made for, whatever gravity is tuned to
     int block_count;
     Block* blocks;
-    Sphere* colliders;
-    float rotation[9]; // of the head at the end of the last substep
-    Substep* substeps; // of the tick
-    Vec3* centres;     // [substep][collider], then as many moves
-    void* memory;      // of all blocks
+    Collider* colliders;
+    Body bodies[BODY_COUNT]; // at the end of the last substep
+    Substep* substeps;       // of the tick
+    Axis* axes;              // [substep][collider]
+    void* memory;            // of all blocks
 };
 
 static inline Vec3 rotate(const float m[9], Vec3 v)

@@ -61,7 +61,7 @@ static void sway(Cases* cases, int substeps)
 static Sim* create(const Case* one, Fault* fault)
 {
     SimDefinition d = sim_default();
-    Sphere spheres[SPHERES];
+    Collider spheres[SPHERES];
     Vec3* rest = calloc((size_t)one->strands * (size_t)one->nodes, sizeof *rest);
     if (rest == NULL) {
         fault_set(fault, "no memory for %d strands", one->strands);
@@ -74,7 +74,8 @@ static Sim* create(const Case* one, Fault* fault)
                  0.002f * (float)(strand / 128));
     }
     for (int k = 0; k < SPHERES; ++k)
-        spheres[k] = (Sphere){{0.02f * (float)k, -0.02f * (float)k, -0.09f}, 0.08f};
+        spheres[k] =
+            collider_sphere((Sphere){{0.02f * (float)k, -0.02f * (float)k, -0.09f}, 0.08f});
     d.model = one->model;
     d.kernel = one->kernel;
     d.strands = one->strands;

@@ -54,7 +54,8 @@ static void head_at(SimHead* head, double t, double dt)
 
 static uint64_t hash_of_run(int threads, float pearl_radius_m)
 {
-    static const Sphere head[] = {{{0, 0.2f, 0}, 0.08f}, {{0, 0.05f, -0.02f}, 0.06f}};
+    static const Collider head[] = {{{0, 0.2f, 0}, {0, 0.2f, 0}, 0.08f, BODY_HEAD},
+                                    {{0, 0.05f, -0.02f}, {0, 0.05f, -0.02f}, 0.06f, BODY_HEAD}};
     Vec3 rest[STRANDS * NODES];
     uint8_t weight[STRANDS * NODES];
     grow(rest, weight);

@@ -454,10 +454,10 @@ static void ponytail_head_is_centred_and_filled_with_spheres(void** state)
     assert_true(vec3_length(miss) < 0.003f);
     assert_int_equal(style->collider_count, 16);
     for (int i = 0; i < 8; ++i) { // those of the head stay within its box
-        Sphere s = style->colliders[i];
-        assert_true(s.centre.y + s.radius < 0.3245f && s.centre.y - s.radius > 0.07f);
-        assert_true(fabsf(s.centre.x) + s.radius < 0.0825f);
-        assert_true(s.centre.z + s.radius < 0.1f && s.centre.z - s.radius > -0.102f);
+        Collider s = style->colliders[i];
+        assert_true(s.from.y + s.radius < 0.3245f && s.from.y - s.radius > 0.07f);
+        assert_true(fabsf(s.from.x) + s.radius < 0.0825f);
+        assert_true(s.from.z + s.radius < 0.1f && s.from.z - s.radius > -0.102f);
     }
     assert_int_equal(style->head.index_count, 3 * 17894);
     assert_null(strstr(said.text, "unlikely"));

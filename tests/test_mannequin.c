@@ -179,7 +179,7 @@ static void mannequin_scalp_ends_at_the_hairline(void** state)
 static void mannequin_colliders_fit_scalp_and_neck(void** state)
 {
     (void)state;
-    Sphere spheres[HAIRSTYLE_MAX_COLLIDERS];
+    Collider spheres[HAIRSTYLE_MAX_COLLIDERS];
     int count = mannequin_colliders(spheres, HAIRSTYLE_MAX_COLLIDERS);
     assert_true(count >= 6 && count <= 12);
     assert_int_equal(mannequin_colliders(spheres, 3), 3);
@@ -188,7 +188,7 @@ static void mannequin_colliders_fit_scalp_and_neck(void** state)
         Vec3 p = made.positions[i];
         float gap = 1.0f;
         for (int s = 0; s < count; ++s) {
-            float d = vec3_length(vec3_sub(p, spheres[s].centre)) - spheres[s].radius;
+            float d = vec3_length(vec3_sub(p, spheres[s].from)) - spheres[s].radius;
             gap = d < gap ? d : gap;
         }
         assert_true(gap > -0.0025f); // no sphere stands out of the skin

@@ -48,7 +48,7 @@ static void shake(Sim* sim, int tick)
 static bool is_at_rest(const Sim* sim, int strand)
 {
     for (int n = 0; n < NODES; ++n) {
-        Vec3 at = rotate(sim->rotation, rest[strand * NODES + n]);
+        Vec3 at = rotate(sim->bodies[BODY_HEAD].rotation, rest[strand * NODES + n]);
         if (vec3_length(vec3_sub(got[strand * NODES + n], at)) > 1e-6f ||
             vec3_length(vec3_sub(got_before[strand * NODES + n], at)) > 1e-6f)
             return false;

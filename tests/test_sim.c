@@ -235,7 +235,8 @@ static void threads_and_neighbours_change_no_bit(void** state)
     Vec3 rest[MAX_NODES], whole[MAX_NODES], part[MAX_NODES], previous[MAX_NODES];
     hang(rest, STRANDS, NODES, LINK_M);
     SimDefinition d = sim_default();
-    d.colliders = (const Sphere[]){{{0, 0.2f, 0}, 0.07f}, {{0.05f, 0, 0}, 0.06f}};
+    d.colliders = (const Collider[]){{{0, 0.2f, 0}, {0, 0.2f, 0}, 0.07f, BODY_HEAD},
+                                     {{0.05f, 0, 0}, {0.05f, 0, 0}, 0.06f, BODY_HEAD}};
     d.collider_count = 2;
     d.nodes = NODES;
     d.rest = rest;
@@ -278,7 +279,7 @@ static void a_turned_state_moves_like_the_unturned_one(void** state)
     Vec3 rest[MAX_NODES], here[MAX_NODES], there[MAX_NODES];
     hang(rest, STRANDS, NODES, LINK_M);
     SimDefinition d = sim_default();
-    d.colliders = (const Sphere[]){{{0, 0.1f, 0.05f}, 0.09f}};
+    d.colliders = (const Collider[]){{{0, 0.1f, 0.05f}, {0, 0.1f, 0.05f}, 0.09f, BODY_HEAD}};
     d.collider_count = 1;
     d.strands = STRANDS;
     d.nodes = NODES;
@@ -417,7 +418,7 @@ static void a_share_of_skin_means_the_same_at_every_rate(void** state)
     assert_near((double)left[1], trig_pow(0.8, 6.0), 0.01);
 }
 
-static SimDefinition beside_a_head(const Vec3* rest, const Sphere* head)
+static SimDefinition beside_a_head(const Vec3* rest, const Collider* head)
 {
     SimDefinition d = sim_default();
     d.strands = 1;
@@ -432,7 +433,7 @@ static void nodes_stay_outside_a_collider(void** state)
 {
     (void)state;
     Vec3 rest[NODES], positions[NODES];
-    const Sphere head = {{0, 0.1f, 0}, 0.08f};
+    const Collider head = {{0, 0.1f, 0}, {0, 0.1f, 0}, 0.08f, BODY_HEAD};
     for (int n = 0; n < NODES; ++n)
         rest[n] = vec3(0, 0.2f - LINK_M * (float)n, 0.1f);
     SimDefinition d = beside_a_head(rest, &head);
@@ -454,7 +455,7 @@ static void nodes_stay_outside_a_collider(void** state)
             sim_positions(k ? without : sim, identity, false, positions);
             for (int n = 1; n < NODES; ++n) {
                 float* least = k ? &nearest_without : &nearest;
-                *least = fminf(*least, vec3_length(vec3_sub(positions[n], head.centre)));
+                *least = fminf(*least, vec3_length(vec3_sub(positions[n], head.from)));
             }
         }
     }
@@ -468,7 +469,7 @@ static void a_rest_pose_inside_a_collider_stays(void** state)
 {
     (void)state;
     Vec3 rest[NODES], positions[NODES];
-    const Sphere head = {{0, 0.1f, 0}, 0.08f};
+    const Collider head = {{0, 0.1f, 0}, {0, 0.1f, 0}, 0.08f, BODY_HEAD};
     for (int n = 0; n < NODES; ++n)
         rest[n] = vec3(0.01f * (float)n, 0.2f - LINK_M * (float)n, 0.05f);
     Sim* sim = create(beside_a_head(rest, &head));
@@ -487,7 +488,7 @@ static void a_node_pushed_out_is_not_thrown_off(void** state)
     (void)state;
     // One node falls on a sphere: it may lie there, but never rise above the surface again.
     const Vec3 rest[2] = {{0, 0.2f, 0}, {0, 0.15f, 0}};
-    const Sphere head = {{0, 0, 0}, 0.1f};
+    const Collider head = {{0, 0, 0}, {0, 0, 0}, 0.1f, BODY_HEAD};
     SimDefinition d = oscillator(rest, 0.0f, 0.0f);
     d.substeps = 4;
     d.gravity_compensation = false;

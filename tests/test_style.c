@@ -84,7 +84,7 @@ static Hairstyle* small_style(void)
     s->sets[1] = (StrandSet){"tail", STRANDS_EXPLICIT, 4, 3, 0, 0, 0, 5, 0, 6, 1e-4f, 1e-5f, 1, 0};
     fill_strands(s, &s->sets[1]);
     s->collider_count = 1;
-    s->colliders[0] = (Sphere){{0, 0.2f, 0}, 0.1f};
+    s->colliders[0] = collider_sphere((Sphere){{0, 0.2f, 0}, 0.1f});
     s->head_kind = HEAD_MESH;
     s->head_centre = vec3(0, 0.216f, 0);
     fill_head(&s->head);
@@ -322,7 +322,7 @@ static void style_round_trip_keeps_everything(void** state)
     assert_memory_equal(a->weight, b->weight, 21);
     assert_memory_equal(a->sets, b->sets, sizeof a->sets[0] * 2);
     assert_memory_equal(a->triangles, b->triangles, sizeof(ScalpTriangle) * 2);
-    assert_memory_equal(a->colliders, b->colliders, sizeof(Sphere));
+    assert_memory_equal(a->colliders, b->colliders, sizeof(Collider));
     assert_memory_equal(&a->material, &b->material, sizeof a->material);
     assert_memory_equal(&a->box, &b->box, sizeof a->box);
     assert_memory_equal(&a->head_centre, &b->head_centre, sizeof a->head_centre);

@@ -21,7 +21,8 @@ static Vec3 rest[ALL], got[ALL], wanted[ALL], got_before[ALL], wanted_before[ALL
 
 static SimDefinition definition(ModelKind model)
 {
-    static const Sphere head[] = {{{0.06f, -0.1f, 0.06f}, 0.05f}};
+    static const Collider head[] = {
+        {{0.06f, -0.1f, 0.06f}, {0.06f, -0.1f, 0.06f}, 0.05f, BODY_HEAD}};
     for (int i = 0; i < ALL; ++i) {
         int s = i / NODES, n = i % NODES;
         rest[i] = vec3(0.003f * (float)s + 0.002f * (float)(n * n % 7), -0.04f * (float)n,
