@@ -16,6 +16,7 @@
 
 #define SIM_MAX_STRANDS    65536
 #define SIM_MAX_NODES      256
+#define SIM_MAX_TIES       1048576
 #define SIM_MAX_SUBSTEPS   1024
 #define SIM_MAX_ITERATIONS 4096
 
@@ -72,6 +73,26 @@ static bool check_colliders(const SimDefinition* d, Fault* fault)
     return true;
 }
 
+static bool check_tie(const SimDefinition* d, const Tie* tie)
+{
+    for (int end = 0; end < 2; ++end)
+        if (tie->strand[end] < 0 || tie->strand[end] >= d->strands || tie->node[end] < 0 ||
+            tie->node[end] >= d->nodes)
+            return false;
+    bool is_loop = tie->strand[0] == tie->strand[1] && tie->node[0] == tie->node[1];
+    return !is_loop && tie->length_m >= 0.0f && tie->length_m <= LOST_M;
+}
+
+static bool check_ties(const SimDefinition* d, Fault* fault)
+{
+    for (int i = 0; i < d->tie_count; ++i)
+        if (!check_tie(d, &d->ties[i]))
+            return fault_set(
+                fault, "simulation: tie %d does not join two of the %d x %d nodes by a length", i,
+                d->strands, d->nodes);
+    return true;
+}
+
 static bool check_stiffness(const SimDefinition* d, Fault* fault)
 {
     double bound = model_stiffness_bound(d), k = (double)d->stiffness_s2;
@@ -121,6 +142,7 @@ static bool check(const SimDefinition* d, Fault* fault)
     return check_model(d, fault) && in_range(d->strands, 1, SIM_MAX_STRANDS, "strands", fault) &&
            in_range(d->nodes, 2, SIM_MAX_NODES, "nodes", fault) &&
            in_range(d->collider_count, 0, HAIRSTYLE_MAX_COLLIDERS, "colliders", fault) &&
+           in_range(d->tie_count, 0, SIM_MAX_TIES, "ties", fault) &&
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
            in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) && check_tuned(d, fault) &&
            check_joint_damping(d, fault) &&
@@ -129,7 +151,7 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
            in_range(d->fall_off_power, 0, 3, "fall_off_power", fault) &&
            in_range(d->threads, 1, 256, "threads", fault) && check_rest(d, fault) &&
-           check_colliders(d, fault);
+           check_colliders(d, fault) && check_ties(d, fault);
 }
 
 // Cuts `count` entries of `size` off the arena; sizes are multiples of 64, so all stay aligned.
@@ -382,7 +404,8 @@ static bool allocate(Sim* sim, const SimDefinition* d)
     sim->substeps = calloc((size_t)d->substeps, sizeof *sim->substeps);
     sim->colliders = calloc(colliders + 1, sizeof *sim->colliders);
     sim->axes = calloc(colliders * (size_t)d->substeps + 1, sizeof *sim->axes);
-    return sim->blocks && sim->memory && sim->substeps && sim->colliders && sim->axes;
+    sim->ties = calloc((size_t)d->tie_count + 1, sizeof *sim->ties);
+    return sim->blocks && sim->memory && sim->substeps && sim->colliders && sim->axes && sim->ties;
 }
 
 static void fill(Sim* sim, const SimDefinition* d)
@@ -394,12 +417,15 @@ static void fill(Sim* sim, const SimDefinition* d)
     }
     for (int k = 0; k < d->collider_count; ++k)
         sim->colliders[k] = d->colliders[k];
+    for (int i = 0; i < d->tie_count; ++i)
+        sim->ties[i] = d->ties[i];
     sim->definition = *d;
     sim->gravity_at_rest = d->gravity_m_s2;
     sim->kernel = kernel_find(d->kernel);
     sim->definition.rest = NULL;
     sim->definition.weight = NULL;
     sim->definition.colliders = NULL;
+    sim->definition.ties = NULL;
     fill_substeps(sim);
     sim_reset(sim, (const float[9]){1, 0, 0, 0, 1, 0, 0, 0, 1});
 }
@@ -426,6 +452,7 @@ void sim_destroy(Sim* sim)
     free(sim->substeps);
     free(sim->colliders);
     free(sim->axes);
+    free(sim->ties);
     free(sim);
 }
 

@@ -41,6 +41,14 @@ typedef enum LengthStage {
     LENGTH_COUNT
 } LengthStage;
 
+// Two nodes of different strands that are held together: at a distance (cloth), or no further apart
+// than it (a rope; a band around hair is ropes between the strands that it holds).
+typedef struct Tie {
+    int strand[2], node[2];
+    float length_m;
+    bool is_rope;
+} Tie;
+
 // What is simulated and how. Start from sim_default().
 typedef struct SimDefinition {
     ModelKind model;
@@ -52,6 +60,8 @@ typedef struct SimDefinition {
     const Collider* colliders; // copied
     int collider_count;
     CollideMode collide;
+    const Tie* ties; // copied; held `iterations` times a substep, in this order
+    int tie_count;
     double rate_hz; // ticks a second
     int substeps;   // of a tick
     int iterations; // of the length stage, a substep

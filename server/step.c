@@ -1,6 +1,7 @@
 // A tick: the head's motion to substeps, blocks to kernels, blocks to threads.
 #include "messages/trig.h"
 #include "server/strands.h"
+#include "server/ties.h"
 
 #include <omp.h>
 #include <string.h>
@@ -62,25 +63,41 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
     }
 }
 
-static void step_gang(const Sim* sim, int gang)
+static void step_gang(const Sim* sim, int gang, const Substep* substeps, int count)
 {
     int first = gang * KERNEL_GANG, left = sim->block_count - first;
-    sim->kernel->step(&sim->blocks[first], left < KERNEL_GANG ? left : KERNEL_GANG, sim->substeps,
-                      sim->definition.substeps);
+    sim->kernel->step(&sim->blocks[first], left < KERNEL_GANG ? left : KERNEL_GANG, substeps,
+                      count);
 }
 
-void sim_step(Sim* sim, const SimHead* heads)
+static void step_all(const Sim* sim, const Substep* substeps, int count)
 {
-    prepare_substeps(sim, heads);
     int gangs = (sim->block_count + KERNEL_GANG - 1) / KERNEL_GANG;
     int threads = sim->definition.threads;
     // libgomp allocates a team for a nested region, even of one thread; a plain loop does not.
     if (threads <= 1 || gangs == 1 || omp_in_parallel()) {
         for (int g = 0; g < gangs; ++g)
-            step_gang(sim, g);
+            step_gang(sim, g, substeps, count);
         return;
     }
 #pragma omp parallel for num_threads(threads) schedule(static)
     for (int g = 0; g < gangs; ++g)
-        step_gang(sim, g);
+        step_gang(sim, g, substeps, count);
+}
+
+// Strands that are not tied to each other run through the whole tick while they are in the cache;
+// tied ones wait for each other at every substep. Ties come first in it, so that colliders have the
+// last word.
+void sim_step(Sim* sim, const SimHead* heads)
+{
+    const SimDefinition* d = &sim->definition;
+    prepare_substeps(sim, heads);
+    if (d->tie_count == 0) {
+        step_all(sim, sim->substeps, d->substeps);
+        return;
+    }
+    for (int s = 0; s < d->substeps; ++s) {
+        ties_hold(sim, d->iterations);
+        step_all(sim, &sim->substeps[s], 1);
+    }
 }

@@ -131,7 +131,8 @@ struct Sim {
     Body bodies[BODY_COUNT]; // at the end of the last substep
     Substep* substeps;       // of the tick
     Axis* axes;              // [substep][collider]
-    void* memory;            // of all blocks
+    Tie* ties;
+    void* memory; // of all blocks
 };
 
 static inline Vec3 rotate(const float m[9], Vec3 v)
