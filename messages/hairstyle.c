@@ -193,6 +193,23 @@ static bool check_look(const Hairstyle* style, Fault* fault)
                      (double)vec3_length(style->head_centre), (double)FARTHEST_M);
 }
 
+static bool check_holds(const Hairstyle* style, Fault* fault)
+{
+    if (style->hold_count < 0 || style->hold_count > HAIRSTYLE_MAX_HOLDS)
+        return fault_set(fault, "%d holds: at most %d", style->hold_count, HAIRSTYLE_MAX_HOLDS);
+    for (int i = 0; i < style->hold_count; ++i) {
+        const Hold* h = &style->holds[i];
+        if (h->kind != HOLD_BAND && h->kind != HOLD_CLOTH)
+            return fault_set(fault, "hold %d: kind %d: 1 a band, 2 cloth", i, h->kind);
+        if (!is_run(h->first_guide, h->guide_count, style->guide_count) || h->guide_count < 2)
+            return fault_set(fault, "hold %d: guides %d + %d of %d", i, h->first_guide,
+                             h->guide_count, style->guide_count);
+        if (h->node < 0 || h->node >= style->nodes)
+            return fault_set(fault, "hold %d: node %d of %d", i, h->node, style->nodes);
+    }
+    return true;
+}
+
 static bool check_triangles(const Hairstyle* style, Fault* fault)
 {
     if (style->triangle_count < 0 || style->triangle_count > HAIRSTYLE_MAX_TRIANGLES)
@@ -383,6 +400,6 @@ static bool check_head(const HeadMesh* mesh, Fault* fault)
 bool hairstyle_validate(const Hairstyle* style, Fault* fault)
 {
     return check_look(style, fault) && check_guides(style, fault) &&
-           check_triangles(style, fault) && check_strand_tables(style, fault) &&
+           check_triangles(style, fault) && check_holds(style, fault) && check_strand_tables(style, fault) &&
            check_sets(style, fault) && check_head(&style->head, fault);
 }

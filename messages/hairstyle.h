@@ -19,6 +19,7 @@
 #define HAIRSTYLE_MAX_SETS      16
 #define HAIRSTYLE_MAX_TRIANGLES 2048
 #define HAIRSTYLE_MAX_COLLIDERS 32
+#define HAIRSTYLE_MAX_HOLDS     16
 #define HAIRSTYLE_MAX_STRANDS   65536
 #define HAIRSTYLE_MAX_POINTS    64 // along one drawn strand
 #define HAIRSTYLE_MAX_VERTICES  65535
@@ -62,6 +63,16 @@ typedef struct StrandOffset {
     int16_t x, y, z;
 } StrandOffset;
 
+typedef enum HoldKind { HOLD_BAND = 1, HOLD_CLOTH = 2 } HoldKind;
+
+// What holds a run of guides together: a band around one of their nodes, which lets them come
+// closer but not apart, or cloth, whose rows they are, each the neighbour of the next.
+typedef struct Hold {
+    int kind; // HoldKind
+    int first_guide, guide_count;
+    int node; // band
+} Hold;
+
 typedef enum HeadKind { HEAD_NONE = 0, HEAD_MANNEQUIN = 1, HEAD_MESH = 2 } HeadKind;
 
 // A run of triangles of the head mesh with one colour.
@@ -98,6 +109,8 @@ typedef struct Hairstyle {
     ScalpTriangle* triangles;
     int collider_count;
     Collider colliders[HAIRSTYLE_MAX_COLLIDERS];
+    int hold_count;
+    Hold holds[HAIRSTYLE_MAX_HOLDS];
     HairMaterial material;
     int head_kind;    // HeadKind
     Vec3 head_centre; // half-way between chin and crown: what cameras orbit

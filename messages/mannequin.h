@@ -22,9 +22,8 @@ Vec3 mannequin_project(Vec3 point, float lift_m);
 // over the hairline.
 float mannequin_scalp(Vec3 surface);
 
-// Spheres inside the head, neck and shoulders for collision, the last of the torso; returns how
-// many
-// (<= capacity).
+// Spheres inside the head, neck and shoulders for collision, the last of them the torso's; returns
+// how many (<= capacity).
 int mannequin_colliders(Collider* colliders, int capacity);
 
 // Triangulates the surface; about 19,000 vertices, close over eyes, lips and ears; positions on the

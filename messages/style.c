@@ -84,6 +84,7 @@ static void carry_fixed(Cursor* cursor, Hairstyle* style)
     carry_int(cursor, &style->set_count);
     carry_int(cursor, &style->triangle_count);
     carry_int(cursor, &style->collider_count);
+    carry_int(cursor, &style->hold_count);
     carry_int(cursor, &style->head_kind);
     carry_bytes(cursor, &style->offset_scale_m, 4);
     carry_vec3(cursor, &style->material.root_colour);
@@ -123,6 +124,12 @@ static void carry_tables(Cursor* cursor, Hairstyle* style)
         carry_bytes(cursor, &style->colliders[i].radius, 4);
         carry_int(cursor, &style->colliders[i].body);
     }
+    for (int i = 0; i < style->hold_count; ++i) {
+        carry_int(cursor, &style->holds[i].kind);
+        carry_int(cursor, &style->holds[i].first_guide);
+        carry_int(cursor, &style->holds[i].guide_count);
+        carry_int(cursor, &style->holds[i].node);
+    }
     for (int i = 0; i < style->triangle_count; ++i)
         carry_bytes(cursor, style->triangles[i].guide, 6);
     for (int i = 0; i < style->guide_count * style->nodes; ++i)
@@ -134,9 +141,10 @@ static bool allocate_tables(Hairstyle* style, Fault* fault)
 {
     if (style->set_count < 0 || style->set_count > HAIRSTYLE_MAX_SETS ||
         style->collider_count < 0 || style->collider_count > HAIRSTYLE_MAX_COLLIDERS ||
+        style->hold_count < 0 || style->hold_count > HAIRSTYLE_MAX_HOLDS ||
         style->triangle_count < 0 || style->triangle_count > HAIRSTYLE_MAX_TRIANGLES)
-        return fault_set(fault, "style: %d sets, %d colliders, %d triangles: beyond the caps",
-                         style->set_count, style->collider_count, style->triangle_count);
+        return fault_set(fault, "style: %d sets, %d colliders, %d holds, %d triangles: beyond the caps",
+                         style->set_count, style->collider_count, style->hold_count, style->triangle_count);
     if (!hairstyle_set_guides(style, style->guide_count, style->nodes, fault)) return false;
     style->triangles = calloc((size_t)style->triangle_count + 1, sizeof *style->triangles);
     return style->triangles != NULL || fault_set(fault, "style: no memory for its triangles");

@@ -25,6 +25,9 @@ typedef struct Look {
     float hug;                        // how closely hanging hair closes in on the neck
     float curl, curl_m;               // ends turn inward (positive) over the last curl_m
     float least_m, most_m;            // shortest and longest guide
+    bool is_tied;                     // all of it through a band, without a parting
+    Vec3 band;                        // where that is
+    float band_m;                     // its radius
     Vec3 root_colour, tip_colour;
 } Look;
 
@@ -39,6 +42,7 @@ typedef struct Look {
 #define RELAX_ROUNDS    12
 #define STEP_M          0.004f
 #define PATH_POINTS     160
+#define BAND_NODE       4 // of a tied style: as many links to the band as past it
 
 // Rays from here meet the scalp once.
 static const Vec3 MIDDLE = {0.0f, 0.2200f, -0.0150f};
@@ -264,7 +268,7 @@ static bool is_bare(const Plan* plan, const int corner[3])
         sum = vec3_add(sum, vec3_sub(plan->root[corner[i]], MIDDLE));
     }
     bool edge = plan->on_edge[corner[0]] && plan->on_edge[corner[1]] && plan->on_edge[corner[2]];
-    if (left && right) return true;
+    if (left && right && !plan->look->is_tied) return true;
     return edge && mannequin_scalp(cast(unit(sum))) < 0.30f;
 }
 
@@ -339,6 +343,50 @@ static float hem_at(const Look* look, Vec3 p)
     return look->hem_m + look->hem_front_m * front + look->hem_side_m * side;
 }
 
+// Along the skin towards the band; past it away from the head, and soon down.
+static Vec3 tied_heading(const Look* look, Vec3 p, float past)
+{
+    if (past > 0.0f) {
+        Vec3 away = unit(vec3_sub(look->band, MIDDLE));
+        return unit(vec3_lerp(away, vec3(0, -1, 0), smooth(0.25f + past / 0.09f)));
+    }
+    Vec3 way = vec3_sub(look->band, p);
+    float near = smooth(vec3_length(way) / 0.06f);
+    return unit(vec3_lerp(way, tangent(way, mannequin_normal(p)), near));
+}
+
+// Marches one tied strand from its root to the band, where it has its own place, and on; `at_band`
+// is the path's point there.
+static int grow_tied(const Plan* plan, Vec3 root, Vec3* path, int* at_band)
+{
+    const Look* look = plan->look;
+    Vec3 axis = unit(vec3_sub(look->band, MIDDLE));
+    Vec3 from = tangent(vec3_sub(root, look->band), axis);
+    float spread = vec3_length(from) / 0.10f;
+    Vec3 place = vec3_mad(look->band, unit(from), look->band_m * (spread < 1.0f ? spread : 1.0f));
+    Look own = *look; // whose band is this strand's place in it
+    own.band = place;
+    int count = 0;
+    Vec3 p = path[count++] = root;
+    while (count < PATH_POINTS / 2 && vec3_length(vec3_sub(place, p)) > STEP_M) {
+        float along = STEP_M * (float)count;
+        p = vec3_mad(p, tied_heading(&own, p, 0.0f), STEP_M);
+        float lack = look->lift_m * smooth(along / 0.05f) - mannequin_distance(p);
+        if (lack > 0.0f) p = vec3_mad(p, mannequin_normal(p), lack);
+        path[count++] = p;
+    }
+    path[count - 1] = place;
+    *at_band = count - 1;
+    // Not all tips at one height: a tail ends in a point.
+    float length = look->least_m + (look->most_m - look->least_m) * (1.0f - 0.7f * spread);
+    p = place;
+    for (float past = STEP_M; past < length && count < PATH_POINTS; past += STEP_M) {
+        p = vec3_mad(p, tied_heading(&own, p, past), STEP_M);
+        path[count++] = p;
+    }
+    return count;
+}
+
 static Vec3 heading(const Plan* plan, Vec3 p, float along, float lift)
 {
     const Look* look = plan->look;
@@ -392,14 +440,14 @@ static int grow(const Plan* plan, Vec3 root, Vec3* path)
 }
 
 // `nodes` points at equal arc lengths along the path.
-static void resample(const Vec3* path, int count, Vec3* out)
+static void resample(const Vec3* path, int count, Vec3* out, int nodes)
 {
     float total = 0.0f, before = 0.0f;
     for (int i = 1; i < count; ++i)
         total += vec3_length(vec3_sub(path[i], path[i - 1]));
     out[0] = path[0];
-    for (int k = 1, i = 1; k < NODES; ++k) {
-        float want = total * (float)k / (float)(NODES - 1);
+    for (int k = 1, i = 1; k < nodes; ++k) {
+        float want = total * (float)k / (float)(nodes - 1);
         float step = vec3_length(vec3_sub(path[i], path[i - 1]));
         while (i < count - 1 && before + step < want) {
             before += step;
@@ -441,10 +489,25 @@ static void grow_guides(const Plan* plan, Hairstyle* style)
     for (int g = 0; g < style->guide_count; ++g) {
         Vec3* nodes = style->rest + g * NODES;
         int count = grow(plan, plan->root[g], path);
-        resample(path, count, nodes);
+        resample(path, count, nodes, NODES);
         clear_segments(nodes);
         style->weight[g * NODES + 1] = 60; // of 255: stiff at the root, so that partings hold
     }
+}
+
+// Combed tight to the band, which bobs a little with the head's skin; free past it.
+static void tie_guides(const Plan* plan, Hairstyle* style)
+{
+    Vec3 path[PATH_POINTS];
+    for (int g = 0; g < style->guide_count; ++g) {
+        Vec3* nodes = style->rest + g * NODES;
+        int at_band, count = grow_tied(plan, plan->root[g], path, &at_band);
+        resample(path, at_band + 1, nodes, BAND_NODE + 1);
+        resample(path + at_band, count - at_band, nodes + BAND_NODE, NODES - BAND_NODE);
+        for (int n = 1; n <= BAND_NODE; ++n)
+            style->weight[g * NODES + n] = (uint8_t)(n < BAND_NODE ? 0 : 120);
+    }
+    style->holds[style->hold_count++] = (Hold){HOLD_BAND, 0, style->guide_count, BAND_NODE};
 }
 
 static void fill_set(Hairstyle* style)
@@ -474,7 +537,10 @@ static bool fill_style(const Plan* plan, Hairstyle* style, Fault* fault)
            (size_t)plan->triangle_count * sizeof *style->triangles);
     memcpy(style->name, plan->look->name, strlen(plan->look->name) + 1);
     style->seed = plan->look->seed;
-    grow_guides(plan, style);
+    if (plan->look->is_tied)
+        tie_guides(plan, style);
+    else
+        grow_guides(plan, style);
     fill_set(style);
     style->collider_count = mannequin_colliders(style->colliders, HAIRSTYLE_MAX_COLLIDERS);
     style->material.root_colour = plan->look->root_colour;
@@ -551,6 +617,25 @@ Hairstyle* groom_bob(Fault* fault)
         .most_m = 0.32f,
         .root_colour = {0.200f, 0.120f, 0.056f},
         .tip_colour = {0.330f, 0.215f, 0.105f},
+    };
+    return make(&look, fault);
+}
+
+Hairstyle* groom_ponytail(Fault* fault)
+{
+    static const Look look = {
+        .name = "ponytail",
+        .seed = 3,
+        .parting_x_m = 0.0f,
+        .parting_end_m = -0.020f,
+        .lift_m = 0.009f,
+        .least_m = 0.22f,
+        .most_m = 0.32f,
+        .is_tied = true,
+        .band = {0.0f, 0.272f, -0.128f},
+        .band_m = 0.012f,
+        .root_colour = {0.016f, 0.012f, 0.010f},
+        .tip_colour = {0.030f, 0.022f, 0.018f},
     };
     return make(&look, fault);
 }

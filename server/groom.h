@@ -7,3 +7,5 @@
 // with a fault. Names: load_builtin_styles.
 Hairstyle* groom_long(Fault* fault);
 Hairstyle* groom_bob(Fault* fault);
+// Combed to a band behind the crown that holds its guides together, and hanging free from there.
+Hairstyle* groom_ponytail(Fault* fault);

@@ -2,6 +2,7 @@
 
 #include "messages/style.h"
 #include "server/bind.h"
+#include "server/crest.h"
 #include "server/fit.h"
 #include "server/groom.h"
 #include "server/import.h"
@@ -15,9 +16,9 @@
 #define PATH_BYTES      512
 #define BOTH_ENDS_BYTES 512
 
-const char* const load_builtin_styles[] = {"long", "bob", NULL};
+const char* const load_builtin_styles[] = {"long", "bob", "ponytail", "crest", NULL};
 
-static Hairstyle* (*const growers[])(Fault*) = {groom_long, groom_bob};
+static Hairstyle* (*const growers[])(Fault*) = {groom_long, groom_bob, groom_ponytail, crest_style};
 
 // What options and style file come to: every path as it is opened, every default still zero.
 typedef struct Recipe {
