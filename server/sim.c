@@ -461,8 +461,8 @@ void sim_turn(Sim* sim, const float turn[9])
 }
 
 // A skinned node is where it is at rest, to the bit; turning it forth and back would round.
-static void read_strand(const Block* block, int lane, const float rotation[9], bool project,
-                        Vec3* strand)
+static void read_strand(const Sim* sim, const Block* block, int lane, const float rotation[9],
+                        bool project, Vec3* strand)
 {
     bool skinned[SIM_MAX_NODES];
     float lengths[SIM_MAX_NODES];
@@ -472,14 +472,16 @@ static void read_strand(const Block* block, int lane, const float rotation[9], b
         strand[n] = skinned[n] ? lane_get(&block->rest[n], lane)
                                : rotate_back(rotation, lane_get(&block->position[n], lane));
     }
-    if (project) project_lengths(strand, block->nodes, lengths, skinned);
+    Obstacles obstacles = {sim->colliders, sim->definition.collider_count,
+                           sim->definition.pearl_radius_m, &block->clearance->v[lane]};
+    if (project) project_lengths(strand, block->nodes, lengths, skinned, &obstacles);
 }
 
 void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* positions)
 {
     int nodes = sim->definition.nodes;
     for (int s = 0; s < sim->definition.strands; ++s)
-        read_strand(&sim->blocks[s / LANES], s % LANES, rotation, project,
+        read_strand(sim, &sim->blocks[s / LANES], s % LANES, rotation, project,
                     positions + (size_t)s * (size_t)nodes);
 }
 
