@@ -21,10 +21,10 @@ typedef struct DaemonSink {
 
 typedef struct DaemonOptions {
     LoadOptions load;
-    const char* scene;  // scene JSON or NULL
-    const char* motion; // see motion.h
-    int characters;     // slots 0..n-1 start filled with the first style; a scene's come first
-    SimDefinition sim;  // rate, substeps, iterations, stiffness ... (strands etc. ignored)
+    struct Scene* scene; // of daemon_use_scene, or NULL
+    const char* motion;  // see motion.h
+    int characters;      // slots 0..n-1 start filled with the first style; a scene's come first
+    SimDefinition sim;   // rate, substeps, iterations, stiffness ... (strands etc. ignored)
     int mtu;
     int64_t epoch; // 0: max(wall clock, highest heard + 1)
     bool fast;     // utime = tick * 1e6 / rate instead of the wall clock
@@ -34,11 +34,11 @@ typedef struct DaemonOptions {
 
 DaemonOptions daemon_default(void);
 
-// Takes a scene: its simulation values go over those in `options` at once, so that what the caller
-// sets afterwards wins; its styles and characters are read by daemon_create. `path` must outlive
-// it.
+// Reads a scene: its simulation values go over those in `options` at once, so that what the caller
+// sets afterwards wins; its styles and characters wait there for daemon_create.
 bool daemon_use_scene(DaemonOptions* options, const char* path, Fault* fault);
 
+// Takes the scene of `options`, also where it fails: one scene makes one daemon.
 Daemon* daemon_create(const DaemonOptions* options, Fault* fault);
 void daemon_destroy(Daemon* daemon);
 void daemon_add_sink(Daemon* daemon, DaemonSink sink);

@@ -27,6 +27,7 @@ const char* argp_program_version = "hair-server (strandcast) " STRANDCAST_VERSIO
 
 typedef struct Options {
     DaemonOptions daemon;
+    const char* scene;
     const char* url;
     const char* record;
     int64_t ticks; // 0: until stopped
@@ -317,12 +318,12 @@ static error_t parse_where(int key, char* text, struct argp_state* state)
 
 static void check_together(const Options* options, struct argp_state* state)
 {
-    if (options->daemon.scene != NULL && options->daemon.load.style_count > 0)
+    if (options->scene != NULL && options->daemon.load.style_count > 0)
         argp_error(state,
                    "--style and --scene: a scene names its own styles; choose one of the two");
-    if (options->daemon.scene != NULL && load_has_groom_options(&options->daemon.load))
+    if (options->scene != NULL && load_has_groom_options(&options->daemon.load))
         argp_error(state, "--scene: what grooms are made of stands in the scene's styles");
-    if (options->daemon.scene != NULL && options->info)
+    if (options->scene != NULL && options->info)
         argp_error(state, "--info is of a --style, not of a --scene");
     if (options->info && (options->record != NULL || options->ticks > 0 || options->hash))
         argp_error(state, "--info prints the style and exits: leave --record, --ticks and --hash "
@@ -341,10 +342,10 @@ static error_t parse(int key, char* text, struct argp_state* state)
     if (key == ARGP_KEY_ARG)
         argp_error(state, "\"%s\" is not an option; did you mean --style %s?", text, text);
     if (options->scene_only) {
-        if (key == KEY_SCENE && options->daemon.scene != NULL)
+        if (key == KEY_SCENE && options->scene != NULL)
             argp_error(state, "--scene %s: a second one, after %s; put all into one scene", text,
-                       options->daemon.scene);
-        if (key == KEY_SCENE) options->daemon.scene = text;
+                       options->scene);
+        if (key == KEY_SCENE) options->scene = text;
         return 0;
     }
     if (key == ARGP_KEY_END) check_together(options, state);
@@ -360,7 +361,7 @@ static bool read_options(Options* options, int argc, char** argv)
     options->daemon = daemon_default();
     options->scene_only = true;
     argp_parse(&argp, argc, argv, 0, NULL, options);
-    const char* scene = options->daemon.scene;
+    const char* scene = options->scene;
     if (scene != NULL && !daemon_use_scene(&options->daemon, scene, &options->fault)) return false;
     options->scene_only = false;
     argp_parse(&argp, argc, argv, 0, NULL, options);

@@ -541,26 +541,49 @@ void sim_turn(Sim* sim, const float turn[9])
 }
 
 // A skinned node is where it is at rest, to the bit; turning it forth and back would round.
-static void read_strand(const Block* block, int lane, const float rotation[9], bool project,
-                        Vec3* strand)
+static void read_strand(const Block* block, int lane, const float rotation[9], Vec3* strand)
+{
+    for (int n = 0; n < block->nodes; ++n)
+        strand[n] = block->keep[n].v[lane] == 0.0f
+                        ? lane_get(&block->rest[n], lane)
+                        : rotate_back(rotation, lane_get(&block->position[n], lane));
+}
+
+static void project_strand(const Block* block, int lane, Obstacles obstacles, Vec3* strand)
 {
     bool skinned[SIM_MAX_NODES];
     float lengths[SIM_MAX_NODES];
     for (int n = 0; n < block->nodes; ++n) {
         skinned[n] = block->keep[n].v[lane] == 0.0f;
         lengths[n] = (float)block->length[n].v[lane];
-        strand[n] = skinned[n] ? lane_get(&block->rest[n], lane)
-                               : rotate_back(rotation, lane_get(&block->position[n], lane));
     }
-    if (project) project_lengths(strand, block->nodes, lengths, skinned);
+    obstacles.clearance = &block->clearance->v[lane];
+    project_lengths(strand, block->nodes, lengths, skinned, &obstacles);
+}
+
+// Where a collider is now, in head space.
+static Collider seen_from_head(const Sim* sim, const float rotation[9], Collider c)
+{
+    if (c.body == BODY_HEAD) return c;
+    const Body* body = &sim->bodies[c.body];
+    c.from = rotate_back(rotation, body_place(body, c.from));
+    c.to = rotate_back(rotation, body_place(body, c.to));
+    return c;
 }
 
 void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* positions)
 {
-    int nodes = sim->definition.nodes;
-    for (int s = 0; s < sim->definition.strands; ++s)
-        read_strand(&sim->blocks[s / LANES], s % LANES, rotation, project,
-                    positions + (size_t)s * (size_t)nodes);
+    const SimDefinition* d = &sim->definition;
+    Collider colliders[HAIRSTYLE_MAX_COLLIDERS];
+    for (int k = 0; k < d->collider_count; ++k)
+        colliders[k] = seen_from_head(sim, rotation, sim->colliders[k]);
+    Obstacles obstacles = {colliders, d->collider_count, d->pearl_radius_m, NULL};
+    for (int s = 0; s < d->strands; ++s) {
+        const Block* block = &sim->blocks[s / LANES];
+        Vec3* strand = positions + (size_t)s * (size_t)d->nodes;
+        read_strand(block, s % LANES, rotation, strand);
+        if (project) project_strand(block, s % LANES, obstacles, strand);
+    }
 }
 
 void sim_state(const Sim* sim, Vec3* positions, Vec3* previous)

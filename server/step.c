@@ -16,18 +16,13 @@ static void meet_air(const SimDefinition* definition, Substep* substep, const Si
     substep->air_move = vec3_sub(vec3_scale(head->wind, substep->dt), head->move);
 }
 
-static Vec3 place(const Body* body, Vec3 point)
-{
-    return vec3_add(rotate(body->rotation, point), body->offset);
-}
-
 static Axis axis_of(const Collider* c, const Body* before, const Body* now)
 {
-    Vec3 from = place(now, c->from), was = place(before, c->from);
+    Vec3 from = body_place(now, c->from), was = body_place(before, c->from);
     Axis axis = {.from = from, .from_move = vec3_sub(from, was)};
     if (memcmp(&c->from, &c->to, sizeof c->from) == 0) return axis;
-    Vec3 then = vec3_sub(place(before, c->to), was);
-    axis.along = vec3_sub(place(now, c->to), from);
+    Vec3 then = vec3_sub(body_place(before, c->to), was);
+    axis.along = vec3_sub(body_place(now, c->to), from);
     axis.along_move = vec3_sub(axis.along, then);
     float square = vec3_dot(axis.along, axis.along);
     axis.inverse2 = square > LEAST_LENGTH_M * LEAST_LENGTH_M ? 1.0f / square : 0.0f;

@@ -158,3 +158,9 @@ static inline void lane_set(Lanes3* lanes, int lane, Vec3 v)
     lanes->y[lane] = (real)v.y;
     lanes->z[lane] = (real)v.z;
 }
+
+// Where a point of a body is, relative to the head's position, world axes.
+static inline Vec3 body_place(const Body* body, Vec3 point)
+{
+    return vec3_add(rotate(body->rotation, point), body->offset);
+}

@@ -21,6 +21,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#define MOST_BYTES 65536 // of a file here
+
 // A directory of our own for each test, and paths in it.
 typedef struct Place {
     char directory[64];
@@ -99,6 +101,16 @@ static size_t read_bytes(const char* path, uint8_t* bytes, size_t size)
     return count;
 }
 
+// A picture as a PNG at `path`, and its bytes.
+static size_t written_bytes(const char* path, int width, int height, uint8_t bytes[MOST_BYTES])
+{
+    Fault fault;
+    Image image = make_picture(width, height, 1);
+    must(image_write_png(&image, path, true, &fault), &fault);
+    image_free(&image);
+    return read_bytes(path, bytes, MOST_BYTES);
+}
+
 static void write_bytes(const char* path, const void* bytes, size_t count)
 {
     FILE* file = fopen(path, "wb");
@@ -149,7 +161,7 @@ static void png_bytes_depend_on_the_pixels_only(void** state)
 {
     Place* place = *state;
     Fault fault;
-    static uint8_t first[1 << 16], second[1 << 16];
+    static uint8_t first[MOST_BYTES], second[MOST_BYTES];
     Image image = make_picture(64, 48, 1);
     must(image_write_png(&image, place_path(place, "a.png"), false, &fault), &fault);
     const size_t count = read_bytes(place->path, first, sizeof first);
@@ -208,11 +220,10 @@ static void reading_refuses_a_header_that_claims_too_much(void** state)
 {
     Place* place = *state;
     Fault fault;
-    static uint8_t bytes[1 << 16];
-    Image image = make_picture(8, 8, 1), back;
+    static uint8_t bytes[MOST_BYTES];
+    Image back;
     const char* path = place_path(place, "a.png");
-    must(image_write_png(&image, path, true, &fault), &fault);
-    const size_t count = read_bytes(path, bytes, sizeof bytes);
+    const size_t count = written_bytes(path, 8, 8, bytes);
     const uint32_t sides[] = {16384, 65536, 0x7fffffff};
     for (int i = 0; i < 3; i++) {
         put_be32(bytes + 16, sides[i]);
@@ -223,18 +234,16 @@ static void reading_refuses_a_header_that_claims_too_much(void** state)
         assert_null(back.rgba);
         expect_words(&fault, path, i < 2 ? "edges must be" : "PNG");
     }
-    image_free(&image);
 }
 
 static void reading_rejects_every_truncation(void** state)
 {
     Place* place = *state;
     Fault fault;
-    static uint8_t bytes[1 << 16];
-    Image image = make_picture(9, 6, 1), back;
+    static uint8_t bytes[MOST_BYTES];
+    Image back;
     const char* path = place_path(place, "a.png");
-    must(image_write_png(&image, path, true, &fault), &fault);
-    const size_t count = read_bytes(path, bytes, sizeof bytes);
+    const size_t count = written_bytes(path, 9, 6, bytes);
     // Up to the check sum of the pixels; the 12 bytes of IEND carry nothing.
     for (size_t kept = 0; kept < count - 16; kept++) {
         write_bytes(path, bytes, kept);
@@ -243,18 +252,16 @@ static void reading_rejects_every_truncation(void** state)
         assert_null(back.rgba);
         expect_words(&fault, path, "PNG");
     }
-    image_free(&image);
 }
 
 static void reading_survives_every_damaged_byte(void** state)
 {
     Place* place = *state;
     Fault fault;
-    static uint8_t bytes[1 << 16];
-    Image image = make_picture(9, 6, 1), back;
+    static uint8_t bytes[MOST_BYTES];
+    Image back;
     const char* path = place_path(place, "a.png");
-    must(image_write_png(&image, path, true, &fault), &fault);
-    const size_t count = read_bytes(path, bytes, sizeof bytes);
+    const size_t count = written_bytes(path, 9, 6, bytes);
     for (size_t i = 0; i < count; i++) {
         bytes[i] ^= 0x55;
         write_bytes(path, bytes, count);
@@ -262,7 +269,6 @@ static void reading_survives_every_damaged_byte(void** state)
         assert_null(back.rgba);
         bytes[i] ^= 0x55;
     }
-    image_free(&image);
 }
 
 static void reading_names_a_file_that_is_not_there(void** state)

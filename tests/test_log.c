@@ -157,14 +157,19 @@ static void log_reads_what_liblcm_writes(void** state)
     unlink(path);
 }
 
+static void write_whole(char path[64], Bytes* whole)
+{
+    make_path(path);
+    write_small(path);
+    load(path, whole);
+}
+
 static void log_truncated_anywhere_gives_the_whole_events_before_the_cut(void** state)
 {
     (void)state;
     char path[64];
     static Bytes whole;
-    make_path(path);
-    write_small(path);
-    load(path, &whole);
+    write_whole(path, &whole);
     int64_t ends[EVENTS + 1] = {0};
     for (int i = 0; i < EVENTS; ++i)
         ends[i + 1] = ends[i] + 28 + 16 + (int64_t)event_size(i);
@@ -189,9 +194,7 @@ static void log_loses_only_the_event_whose_header_is_damaged(void** state)
     (void)state;
     char path[64];
     static Bytes whole;
-    make_path(path);
-    write_small(path);
-    load(path, &whole);
+    write_whole(path, &whole);
     size_t start = 0;
     for (int i = 0; i < 4; ++i)
         start += 28 + 16 + event_size(i);
@@ -226,9 +229,7 @@ static void log_survives_corruption(void** state)
     (void)state;
     char path[64];
     static Bytes whole;
-    make_path(path);
-    write_small(path);
-    load(path, &whole);
+    write_whole(path, &whole);
     for (uint32_t n = 0; n < 3000; ++n) {
         Bytes damaged = whole;
         for (uint32_t i = 0; i < 1 + n % 40; ++i)
