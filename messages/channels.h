@@ -10,6 +10,7 @@
 #define CHANNEL_GUIDES_REGEX  "HAIR_GUIDES_[0-9]{4}"
 #define CHANNEL_STYLE         "HAIR_STYLE"
 #define CHANNEL_POSE          "HAIR_POSE"
+#define CHANNEL_TORSO         "HAIR_TORSO" // a pose_t too
 #define CHANNEL_CHARACTER     "HAIR_CHARACTER"
 #define CHANNEL_WIND          "HAIR_WIND"
 #define CHANNEL_TUNING        "HAIR_TUNING"

@@ -1,6 +1,7 @@
 #include "server/character.h"
 
 #include "messages/trig.h"
+#include "server/weave.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -49,10 +50,25 @@ SimDefinition character_definition(const SimDefinition* sim, const Hairstyle* ha
     return definition;
 }
 
-static bool allocate(Character* c, const SimDefinition* definition, Fault* fault)
+Sim* character_sim(const SimDefinition* sim, const Hairstyle* hair, Fault* fault)
 {
-    c->sim = sim_create(definition, fault);
+    SimDefinition definition = character_definition(sim, hair);
+    Tie* ties = weave_ties(hair, &definition.tie_count);
+    definition.ties = ties;
+    Sim* made = NULL;
+    if (definition.tie_count < 0)
+        fault_set(fault, "no memory for what holds %s together", hair->name);
+    else
+        made = sim_create(&definition, fault);
+    free(ties);
+    return made;
+}
+
+static bool allocate(Character* c, const SimDefinition* sim, Fault* fault)
+{
+    c->sim = character_sim(sim, c->hair, fault);
     if (c->sim == NULL) return false;
+    const SimDefinition* definition = sim_definition(c->sim);
     c->heads = calloc((size_t)definition->substeps, sizeof *c->heads);
     return (c->heads != NULL &&
             publish_planes_create(&c->planes, definition->strands, definition->nodes)) ||
@@ -62,17 +78,20 @@ static bool allocate(Character* c, const SimDefinition* definition, Fault* fault
 Character* character_create(const SimDefinition* sim, const Hairstyle* hair, const Motion* motion,
                             Vec3d position, int64_t step, Fault* fault)
 {
-    SimDefinition definition = character_definition(sim, hair);
     Character* c = calloc(1, sizeof *c);
-    if (c == NULL || !allocate(c, &definition, fault)) {
-        if (c == NULL) fault_set(fault, "no memory for a character");
-        character_destroy(c);
+    if (c == NULL) {
+        fault_set(fault, "no memory for a character");
         return NULL;
     }
     c->hair = hair;
+    if (!allocate(c, sim, fault)) {
+        character_destroy(c);
+        return NULL;
+    }
     c->motion = motion;
     c->base = (Pose){position, quat_identity()};
     poses_init(&c->poses, c->base, 1.0 / sim->rate_hz);
+    poses_init(&c->torso, c->base, 1.0 / sim->rate_hz);
     start(c, step);
     return c;
 }
@@ -132,6 +151,15 @@ static Vec3d wind_at(const WindMessage* wind, double t)
     return vec3d_scale(vec3d_from(wind->velocity), 1.0 + (double)wind->gust * swing);
 }
 
+static void move_torso(const Character* c, SimHead* head, double t)
+{
+    head->has_torso = c->torso.any;
+    if (!head->has_torso) return;
+    Pose torso = poses_at(&c->torso, t);
+    quat_matrix(head->torso_rotation, torso.orientation);
+    head->torso_offset = vec3_from(vec3d_sub(torso.position, c->head.position));
+}
+
 static void move_head(Character* c, SimHead* head, double t)
 {
     MotionState state = {.segment = c->motion_segment}; // the bus brings none of it
@@ -149,6 +177,7 @@ static void move_head(Character* c, SimHead* head, double t)
     head->second_difference = vec3_from(change);
     head->move = vec3_from(c->move);
     head->wind = vec3_from(vec3d_add(state.wind, wind_at(&c->wind, t)));
+    move_torso(c, head, t);
 }
 
 void character_step(Character* c, int64_t step, bool project)

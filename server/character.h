@@ -17,8 +17,9 @@ typedef struct Character {
     const Motion* motion;
     Pose base; // where the motion happens
     PoseRing poses;
-    Pose head;  // at the end of the last substep
-    Vec3d move; // of the head in the last substep, m
+    PoseRing torso; // from the bus alone; while it is empty the torso moves with the head
+    Pose head;      // at the end of the last substep
+    Vec3d move;     // of the head in the last substep, m
     WindMessage wind;
     int motion_segment;
     int32_t segment; // as published
@@ -32,6 +33,9 @@ typedef struct Character {
 
 // `sim` with the strands and colliders of `hair`, which must outlive the definition.
 SimDefinition character_definition(const SimDefinition* sim, const Hairstyle* hair);
+
+// What simulates it: those, and the ties of what holds the style together. NULL with a fault.
+Sim* character_sim(const SimDefinition* sim, const Hairstyle* hair, Fault* fault);
 
 // Step n simulates the time from (n - 1) / rate to n / rate. This is the time at the end of its
 // substep `substep`; 0 is the end of the step before.

@@ -43,8 +43,7 @@ static bool check_parts(const StyleBytes* bytes, int mtu, Fault* fault)
 // Now, not when the first character comes: by then nobody is looking.
 static bool check_simulation(const Daemon* daemon, const Hairstyle* hair, Fault* fault)
 {
-    SimDefinition definition = character_definition(&daemon->sim, hair);
-    Sim* trial = sim_create(&definition, fault);
+    Sim* trial = character_sim(&daemon->sim, hair, fault);
     sim_destroy(trial);
     return trial != NULL;
 }

@@ -50,6 +50,7 @@ static bool decode_input(Input* input, const uint8_t* bytes, size_t size, Fault*
 {
     switch (input->kind) {
     case INPUT_POSE:
+    case INPUT_TORSO:
         return pose_decode(&input->pose, bytes, size, fault);
     case INPUT_CHARACTER:
         return character_decode(&input->character, bytes, size, fault);
@@ -66,6 +67,7 @@ static const struct {
     Complaint complaint;
 } input_table[INPUT_KINDS] = {
     [INPUT_POSE] = {CHANNEL_POSE, COMPLAINT_POSE},
+    [INPUT_TORSO] = {CHANNEL_TORSO, COMPLAINT_POSE},
     [INPUT_CHARACTER] = {CHANNEL_CHARACTER, COMPLAINT_CHARACTER},
     [INPUT_WIND] = {CHANNEL_WIND, COMPLAINT_WIND},
     [INPUT_TUNING] = {CHANNEL_TUNING, COMPLAINT_TUNING},
@@ -168,6 +170,17 @@ static void apply_pose(Daemon* daemon, const PoseMessage* message)
         push_pose(daemon, c, message);
 }
 
+// A torso may be posed under a head that moves by itself.
+static void apply_torso(Daemon* daemon, const PoseMessage* message)
+{
+    Character* c = daemon->characters[message->slot];
+    if (c != NULL)
+        poses_push(&c->torso, message, character_time(&daemon->sim, daemon->steps, 0));
+    else
+        complaints_reject(&daemon->complaints, COMPLAINT_EMPTY_SLOT,
+                          "a pose for a slot without a character");
+}
+
 static bool is_among(const Character* c, int first, int count)
 {
     return c->number >= first && c->number < first + count;
@@ -213,6 +226,9 @@ static void apply_input(Daemon* daemon, const Input* input)
     switch (input->kind) {
     case INPUT_POSE:
         apply_pose(daemon, &input->pose);
+        break;
+    case INPUT_TORSO:
+        apply_torso(daemon, &input->pose);
         break;
     case INPUT_CHARACTER:
         apply_character(daemon, &input->character);

@@ -465,11 +465,11 @@ static void push(Vec3* node, Vec3 at, float by)
 }
 
 // Long segments cut corners of the skull that the path went round: nodes move out until the
-// polyline, too, is outside.
-static void clear_segments(Vec3* nodes)
+// polyline, too, is outside: of the first `count`.
+static void clear_segments(Vec3* nodes, int count)
 {
     for (int round = 0; round < 24; ++round)
-        for (int i = 1; i < NODES; ++i) {
+        for (int i = 1; i < count; ++i) {
             float lack = 0.0060f - mannequin_distance(nodes[i]);
             if (lack > 0.0f) push(&nodes[i], nodes[i], lack);
             for (int q = 1; q < 4; ++q) {
@@ -490,12 +490,12 @@ static void grow_guides(const Plan* plan, Hairstyle* style)
         Vec3* nodes = style->rest + g * NODES;
         int count = grow(plan, plan->root[g], path);
         resample(path, count, nodes, NODES);
-        clear_segments(nodes);
+        clear_segments(nodes, NODES);
         style->weight[g * NODES + 1] = 60; // of 255: stiff at the root, so that partings hold
     }
 }
 
-// Combed tight to the band, which bobs a little with the head's skin; free past it.
+// Combed tight over the skull; the band hangs in the hair alone, and past it all is free.
 static void tie_guides(const Plan* plan, Hairstyle* style)
 {
     Vec3 path[PATH_POINTS];
@@ -503,9 +503,10 @@ static void tie_guides(const Plan* plan, Hairstyle* style)
         Vec3* nodes = style->rest + g * NODES;
         int at_band, count = grow_tied(plan, plan->root[g], path, &at_band);
         resample(path, at_band + 1, nodes, BAND_NODE + 1);
+        clear_segments(nodes, BAND_NODE);
         resample(path + at_band, count - at_band, nodes + BAND_NODE, NODES - BAND_NODE);
-        for (int n = 1; n <= BAND_NODE; ++n)
-            style->weight[g * NODES + n] = (uint8_t)(n < BAND_NODE ? 0 : 120);
+        static const uint8_t combed[BAND_NODE] = {0, 0, 60, 140};
+        memcpy(style->weight + g * NODES, combed, sizeof combed);
     }
     style->holds[style->hold_count++] = (Hold){HOLD_BAND, 0, style->guide_count, BAND_NODE};
 }

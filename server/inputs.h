@@ -8,6 +8,7 @@
 
 typedef enum InputKind {
     INPUT_POSE,
+    INPUT_TORSO, // a pose too
     INPUT_CHARACTER,
     INPUT_WIND,
     INPUT_TUNING,

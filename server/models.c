@@ -36,6 +36,19 @@ const Model models[MODEL_COUNT] = {
                         .has_angles = true},
 };
 
+const char* const collide_names[COLLIDE_COUNT + 1] = {
+    [COLLIDE_POINT] = "point", [COLLIDE_PEARL] = "pearl", [COLLIDE_SEGMENT] = "segment"};
+const char* const length_names[LENGTH_COUNT + 1] = {
+    [LENGTH_SWEEPS] = "sweeps", [LENGTH_DIRECT] = "direct"};
+
+int choice_find(const char* const* names, const char* name)
+{
+    int i = 0;
+    while (names[i] != NULL && strcmp(names[i], name) != 0)
+        ++i;
+    return i;
+}
+
 ModelKind model_find(const char* name)
 {
     int kind = 0;

@@ -18,6 +18,13 @@ typedef struct Model {
 
 extern const Model models[MODEL_COUNT];
 
+// Names of the other choices, as --collide and --length and a scene have them; NULL ends them.
+extern const char* const collide_names[COLLIDE_COUNT + 1];
+extern const char* const length_names[LENGTH_COUNT + 1];
+
+// Index of `name`; that of the NULL where there is none.
+int choice_find(const char* const* names, const char* name);
+
 // MODEL_COUNT where there is none of that name.
 ModelKind model_find(const char* name);
 

@@ -1,5 +1,6 @@
 #include "server/scene.h"
 
+#include "server/models.h"
 #include "server/motion.h"
 
 #include <errno.h>
@@ -207,6 +208,33 @@ READER(read_int)
     return true;
 }
 
+static bool read_choice(const Reader* reader, const Place* place, const json_t* value,
+                        const Member* member, const char* const* names, int* to)
+{
+    const char* name = json_string_value(value);
+    char text[160];
+    int length = snprintf(text, sizeof text, "\"%s\" must be one of", member->key);
+    for (int i = 0; names[i] != NULL; ++i) {
+        if (name != NULL && strcmp(name, names[i]) == 0) {
+            *to = i;
+            return true;
+        }
+        if (length < (int)sizeof text)
+            length += snprintf(text + length, sizeof text - (size_t)length, " %s", names[i]);
+    }
+    return fault_at(reader, place, text);
+}
+
+READER(read_collide)
+{
+    return read_choice(reader, place, value, member, collide_names, &FIELD(int));
+}
+
+READER(read_length)
+{
+    return read_choice(reader, place, value, member, length_names, &FIELD(int));
+}
+
 READER(read_position)
 {
     if (!json_is_array(value) || json_array_size(value) != 3)
@@ -362,6 +390,8 @@ static const Member simulation_members[] = {
     {"down_share", read_float, offsetof(SimDefinition, down_share), 0, 1, false},
     {"gravity_m_s2", read_float, offsetof(SimDefinition, gravity_m_s2), -1000, 1000, false},
     {"pearl_radius_m", read_float, offsetof(SimDefinition, pearl_radius_m), 0, 1, false},
+    {"collide", read_collide, offsetof(SimDefinition, collide), 0, 0, false},
+    {"length", read_length, offsetof(SimDefinition, length), 0, 0, false},
     {"fall_off_per_m", read_float, offsetof(SimDefinition, fall_off_per_m), 0, 1e6, false},
     {"fall_off_power", read_int, offsetof(SimDefinition, fall_off_power), 0, 3, false},
     {0},

@@ -54,6 +54,8 @@ enum {
     KEY_RATE,
     KEY_SUBSTEPS,
     KEY_ITERATIONS,
+    KEY_LENGTH,
+    KEY_COLLIDE,
     KEY_STIFFNESS,
     KEY_DAMPING,
     KEY_DRAG,
@@ -99,6 +101,15 @@ static const struct argp_option option_table[] = {
     {"rate", KEY_RATE, "HZ", 0, "Ticks a second (60)", 2},
     {"substeps", KEY_SUBSTEPS, "N", 0, "Steps of a tick (4)", 2},
     {"iterations", KEY_ITERATIONS, "N", 0, "Length corrections of a substep (1)", 2},
+    {"length", KEY_LENGTH, "sweeps|direct", 0,
+     "sweeps (default): links corrected one after another; direct: all at once, at twice the price "
+     "and, from 2 iterations on, with less stretch for it",
+     2},
+    {"collide", KEY_COLLIDE, "point|pearl|segment", 0,
+     "What is kept out of head and torso: nodes, nodes as small spheres (default), or those and "
+     "the "
+     "links between them",
+     2},
     {"stiffness", KEY_STIFFNESS, "S2", 0, "k/m at the root, 1/s^2 (1600); falls to the tip", 2},
     {"damping", KEY_DAMPING, "S", 0, "Decay of velocity relative to the head, 1/s (8)", 2},
     {"drag", KEY_DRAG, "S", 0, "Decay of velocity relative to the air where a wind blows, 1/s (1)",
@@ -157,6 +168,22 @@ static int64_t whole(struct argp_state* state, const char* name, const char* tex
         argp_error(state, "--%s %s: must be a whole number from %" PRId64 " to %" PRId64, name,
                    text, low, high);
     return value;
+}
+
+// One of `names`, by its index.
+static int choice(struct argp_state* state, const char* name, const char* text,
+                  const char* const* names)
+{
+    char list[80] = "";
+    for (int i = 0; names[i] != NULL; ++i)
+        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s",
+                 i == 0                 ? ""
+                 : names[i + 1] == NULL ? " or "
+                                        : ", ",
+                 names[i]);
+    int index = choice_find(names, text);
+    if (names[index] == NULL) argp_error(state, "--%s %s: must be %s", name, text, list);
+    return index;
 }
 
 static bool on_off(struct argp_state* state, const char* name, const char* text)
@@ -251,6 +278,12 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
         break;
     case KEY_ITERATIONS:
         sim->iterations = (int)whole(state, "iterations", text, 0, 64);
+        break;
+    case KEY_LENGTH:
+        sim->length = (LengthStage)choice(state, "length", text, length_names);
+        break;
+    case KEY_COLLIDE:
+        sim->collide = (CollideMode)choice(state, "collide", text, collide_names);
         break;
     case KEY_STIFFNESS:
         sim->stiffness_s2 = (float)number(state, "stiffness", text, 0, 1e6);
@@ -444,8 +477,9 @@ static void hear(void* context, const char* channel, const uint8_t* bytes, size_
 
 static bool open_bus(Server* server, Fault* fault)
 {
-    static const char* const heard[] = {CHANNEL_POSE,   CHANNEL_CHARACTER, CHANNEL_WIND,
-                                        CHANNEL_TUNING, CHANNEL_REQUEST,   CHANNEL_STATUS};
+    static const char* const heard[] = {CHANNEL_POSE,  CHANNEL_TORSO,  CHANNEL_CHARACTER,
+                                        CHANNEL_WIND,  CHANNEL_TUNING, CHANNEL_REQUEST,
+                                        CHANNEL_STATUS};
     server->link = link_open(server->options->url, fault);
     if (server->link == NULL) return false;
     for (size_t i = 0; i < sizeof heard / sizeof heard[0]; ++i)

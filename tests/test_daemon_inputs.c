@@ -274,6 +274,64 @@ static void inputs_wait_for_the_tick_and_are_said_as_applied(void** state)
     daemon_destroy(daemon);
 }
 
+static void send_torso(Daemon* daemon, double t, double height, int slot)
+{
+    uint8_t bytes[CONTROL_MAX_BYTES];
+    PoseMessage message = {.utime = (int64_t)(t * 1e6),
+                           .pose = {{0.6 * slot, height, 0}, quat_identity()},
+                           .slot = (uint16_t)slot};
+    daemon_receive(daemon, CHANNEL_TORSO, bytes, pose_encode(bytes, sizeof bytes, &message));
+}
+
+// Two seconds under the head of slot 1, at rest 0.6 m aside, while its torso rises by `height`.
+static void shrug(Heard* of, double height, bool has_torso)
+{
+    DaemonOptions options = options_for(of, "none");
+    options.characters = 2;
+    Daemon* daemon = create(&options, of);
+    for (int i = 0; i < 120; ++i) {
+        double part = fmin(1, i / 60.0);
+        if (has_torso) send_torso(daemon, 1 + i / 60.0, height * part, 1);
+        tick(daemon, of);
+    }
+    assert_int_equal(daemon_status(daemon).rejected, 0);
+    daemon_destroy(daemon);
+}
+
+// How far apart texels are at most, quanta.
+static int apart(const Heard* a, const Heard* b)
+{
+    int most = 0;
+    for (int i = 0; i < 64 * 8 * 3; ++i) {
+        int d = abs(a->positions[1][i] - b->positions[1][i]);
+        most = d > most ? d : most;
+    }
+    return most;
+}
+
+static void a_torso_posed_by_the_bus_pushes_hair(void** state)
+{
+    (void)state;
+    shrug(&heard, 0, false);
+    shrug(&other, 0, true);
+    assert_true(apart(&heard, &other) <= 1); // where the head has it anyway
+    assert_int_equal(other.applied, 120);
+    assert_string_equal(other.last_applied.channel, CHANNEL_TORSO);
+    shrug(&other, 0.06, true);
+    assert_true(apart(&heard, &other) > 500); // a shrug lifts the hair that lies on the shoulders
+}
+
+static void a_torso_for_nobody_is_refused(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "none");
+    Daemon* daemon = create(&options, &heard);
+    send_torso(daemon, 1, 0, 3);
+    tick(daemon, &heard);
+    assert_int_equal(daemon_status(daemon).rejected, 1);
+    daemon_destroy(daemon);
+}
+
 static void a_flood_of_poses_keeps_the_newest(void** state)
 {
     (void)state;
@@ -302,6 +360,8 @@ int main(void)
         cmocka_unit_test(less_gravity_lifts_the_hair_of_its_slots_within_a_tick),
         cmocka_unit_test(an_unstable_tuning_is_refused_told_once_and_counted),
         cmocka_unit_test(inputs_wait_for_the_tick_and_are_said_as_applied),
+        cmocka_unit_test(a_torso_posed_by_the_bus_pushes_hair),
+        cmocka_unit_test(a_torso_for_nobody_is_refused),
         cmocka_unit_test(a_flood_of_poses_keeps_the_newest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
