@@ -157,13 +157,16 @@ static void a_scene_says_styles_characters_and_physics(void** state)
     char path[64];
     DaemonOptions options = options_for(&heard, "none");
     assert_true(try_scene("{\"rate_hz\": 50, \"substeps\": 2,\n"
-                          " \"simulation\": {\"stiffness_s2\": 300, \"fall_off_power\": 1},\n"
+                          " \"simulation\": {\"stiffness_s2\": 300, \"fall_off_power\": 1,\n"
+                          "   \"collide\": \"segment\", \"length\": \"direct\"},\n"
                           " \"styles\": [{\"name\": \"hers\", \"builtin\": \"long\"},\n"
                           "            {\"name\": \"his\", \"builtin\": \"bob\"}],\n"
                           " \"characters\": [{\"slot\": 3, \"style\": \"his\",\n"
                           "   \"motion\": \"nod\", \"position\": [1, 0, -2]}, {\"slot\": 1}]}",
                           &options, path, NULL));
     assert_true(options.sim.rate_hz == 50.0 && options.sim.stiffness_s2 == 300.0f);
+    assert_int_equal(options.sim.collide, COLLIDE_SEGMENT);
+    assert_int_equal(options.sim.length, LENGTH_DIRECT);
     Daemon* daemon = create(&options, &heard);
     unlink(path);
     tick(daemon, &heard);
@@ -194,6 +197,9 @@ static void a_wrong_scene_names_line_and_column(void** state)
         {"{\"styles\": [{\"name\": \"a\", \"files\": [3]}]}", "\"files\"[0] must be a text"},
         {"{\"styles\": {}}", "\"styles\" must be a list"},
         {"{\"styles\": [\"bob\"]}", "\"styles\"[0] must be an object"},
+        {"{\"simulation\": {\"collide\": \"beads\"}}",
+         "\"collide\" must be one of point pearl segment"},
+        {"{\"simulation\": {\"length\": 3}}", "\"length\" must be one of sweeps direct"},
         {"{\"simulation\": 3}", "\"simulation\" must be an object"},
         {"{\"characters\": 3}", ":1:2:"},
         {"{\"substeps\": 2.5}", ":1:2:"},
