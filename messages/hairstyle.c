@@ -400,6 +400,7 @@ static bool check_head(const HeadMesh* mesh, Fault* fault)
 bool hairstyle_validate(const Hairstyle* style, Fault* fault)
 {
     return check_look(style, fault) && check_guides(style, fault) &&
-           check_triangles(style, fault) && check_holds(style, fault) && check_strand_tables(style, fault) &&
-           check_sets(style, fault) && check_head(&style->head, fault);
+           check_triangles(style, fault) && check_holds(style, fault) &&
+           check_strand_tables(style, fault) && check_sets(style, fault) &&
+           check_head(&style->head, fault);
 }

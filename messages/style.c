@@ -143,8 +143,9 @@ static bool allocate_tables(Hairstyle* style, Fault* fault)
         style->collider_count < 0 || style->collider_count > HAIRSTYLE_MAX_COLLIDERS ||
         style->hold_count < 0 || style->hold_count > HAIRSTYLE_MAX_HOLDS ||
         style->triangle_count < 0 || style->triangle_count > HAIRSTYLE_MAX_TRIANGLES)
-        return fault_set(fault, "style: %d sets, %d colliders, %d holds, %d triangles: beyond the caps",
-                         style->set_count, style->collider_count, style->hold_count, style->triangle_count);
+        return fault_set(
+            fault, "style: %d sets, %d colliders, %d holds, %d triangles: beyond the caps",
+            style->set_count, style->collider_count, style->hold_count, style->triangle_count);
     if (!hairstyle_set_guides(style, style->guide_count, style->nodes, fault)) return false;
     style->triangles = calloc((size_t)style->triangle_count + 1, sizeof *style->triangles);
     return style->triangles != NULL || fault_set(fault, "style: no memory for its triangles");

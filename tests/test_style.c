@@ -85,6 +85,10 @@ static Hairstyle* small_style(void)
     fill_strands(s, &s->sets[1]);
     s->collider_count = 1;
     s->colliders[0] = collider_sphere((Sphere){{0, 0.2f, 0}, 0.1f});
+    s->colliders[s->collider_count++] = (Collider){{0, 0, 0}, {0.1f, 0.01f, 0}, 0.05f, BODY_TORSO};
+    s->hold_count = 2;
+    s->holds[0] = (Hold){HOLD_BAND, 0, 4, 1};
+    s->holds[1] = (Hold){HOLD_CLOTH, 4, 3, 0};
     s->head_kind = HEAD_MESH;
     s->head_centre = vec3(0, 0.216f, 0);
     fill_head(&s->head);
@@ -137,6 +141,17 @@ static void hairstyle_box_holds_every_pose_of_its_guides(void** state)
     }
     assert_true(s->box.high.x - s->box.low.x < 0.06f + 2.2f * 0.05f); // and not more than that
     hairstyle_destroy(s);
+}
+
+static bool break_hold(Hairstyle* s, int what)
+{
+    const Hold wrong[] = {{3, 0, 4, 1}, {HOLD_BAND, 0, 4, 3},  {HOLD_BAND, 0, 4, -1},
+                          {0, 0, 4, 1}, {HOLD_CLOTH, 4, 4, 0}, {HOLD_CLOTH, -1, 3, 0}};
+    int count = (int)(sizeof wrong / sizeof wrong[0]);
+    if (what < count) s->holds[0] = wrong[what];
+    if (what == count) s->hold_count = HAIRSTYLE_MAX_HOLDS + 1;
+    if (what == count + 1) s->colliders[1].body = BODY_COUNT;
+    return what >= 0 && what <= count + 1;
 }
 
 // Each breaks one thing; the audit must see it.
@@ -260,14 +275,14 @@ static void break_style(Hairstyle* s, int what)
             s->strands[i].guide[0] = s->strands[i].guide[1] = s->strands[i].guide[2] = 4;
         break;
     default:
-        fail();
+        assert_true(break_hold(s, what - 38));
     }
 }
 
 static void hairstyle_validate_sees_every_broken_thing(void** state)
 {
     (void)state;
-    for (int what = 0; what <= 37; ++what) {
+    for (int what = 0; what <= 45; ++what) {
         Hairstyle* s = small_style();
         break_style(s, what);
         Fault fault = {0};
@@ -322,7 +337,9 @@ static void style_round_trip_keeps_everything(void** state)
     assert_memory_equal(a->weight, b->weight, 21);
     assert_memory_equal(a->sets, b->sets, sizeof a->sets[0] * 2);
     assert_memory_equal(a->triangles, b->triangles, sizeof(ScalpTriangle) * 2);
-    assert_memory_equal(a->colliders, b->colliders, sizeof(Collider));
+    assert_memory_equal(a->colliders, b->colliders, sizeof(Collider) * 2);
+    assert_int_equal(b->hold_count, 2);
+    assert_memory_equal(a->holds, b->holds, sizeof(Hold) * 2);
     assert_memory_equal(&a->material, &b->material, sizeof a->material);
     assert_memory_equal(&a->box, &b->box, sizeof a->box);
     assert_memory_equal(&a->head_centre, &b->head_centre, sizeof a->head_centre);
