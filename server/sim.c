@@ -146,7 +146,7 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
            in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) && check_tuned(d, fault) &&
            check_joint_damping(d, fault) &&
-           in_range((double)d->down_share, 0, 1, "down_share", fault) &&
+           in_range((double)d->down_share, 0, d->force ? 10 : 1, "down_share", fault) &&
            in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
            in_range(d->fall_off_power, 0, 3, "fall_off_power", fault) &&

@@ -83,7 +83,7 @@ typedef struct SimDefinition {
     bool gravity_compensation;
     float tip_mass; // of the last node, in masses of the others: 1, or a half
     bool outermost; // forest: the head's acceleration acts on the tips alone
-    bool force;     // take what is beyond the stability bound
+    bool force;     // take what is beyond the stability bound, and a down_share beyond 1
     int threads;    // OpenMP threads over blocks; result does not depend on it
 } SimDefinition;
 

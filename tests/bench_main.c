@@ -325,6 +325,8 @@ static const Case cases[] = {
 
 static const Study studies[] = {
     {"sim", "what a tick costs, by model, kernel, strands, nodes, iterations, threads", study_sim},
+    {"stability", "where the models fail: boundaries measured and derived, eleven maps",
+     study_stability},
 };
 #define STUDIES (sizeof studies / sizeof studies[0])
 
@@ -489,13 +491,13 @@ int main(int argc, char** argv)
     argp_parse(&argp, argc, argv, 0, NULL, &options);
     if (options.study != NULL && !options.list) return run_study(&options);
     for (size_t i = 0; options.list && i < STUDIES; ++i)
-        printf("%-8s %s (a study: columns of its own)\n", studies[i].name, studies[i].help);
+        printf("%-9s %s (a study: columns of its own)\n", studies[i].name, studies[i].help);
     if (!options.list) printf("bench,case,unit,min,median,repeats\n");
     bool done = true;
     for (size_t i = 0; i < CASES; ++i) {
         if (options.any && !options.wanted[i]) continue;
         if (options.list)
-            printf("%-8s %s, %s\n", cases[i].name, cases[i].what, cases[i].unit);
+            printf("%-9s %s, %s\n", cases[i].name, cases[i].what, cases[i].unit);
         else
             done = run(&cases[i], options.repeats) && done;
     }

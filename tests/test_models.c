@@ -3,6 +3,7 @@
 #include "messages/vec.h"
 #include "server/kernel.h"
 #include "server/models.h"
+#include "tests/modes.h"
 #include "tests/strand.h"
 
 #include <math.h>
@@ -297,50 +298,6 @@ static void spring_is_critically_damped_where_it_should(void** state)
 
 // Stability -------------------------------------------------------------------------------------
 
-// The largest eigenvalue of a symmetric matrix, by powers.
-static double largest_eigenvalue(const double* m, int size)
-{
-    double v[MAX_LINKS], w[MAX_LINKS], value = 0.0;
-    for (int i = 0; i < size; ++i)
-        v[i] = i % 2 == 0 ? 1.0 : -1.0;
-    for (int pass = 0; pass < 3000; ++pass) {
-        double sum = 0.0;
-        for (int i = 0; i < size; ++i) {
-            w[i] = 0.0;
-            for (int j = 0; j < size; ++j)
-                w[i] += m[i * size + j] * v[j];
-            sum += w[i] * w[i];
-        }
-        value = sqrt(sum);
-        for (int i = 0; i < size; ++i)
-            v[i] = w[i] / value;
-    }
-    return value;
-}
-
-// Rows of D, one a joint: the angle of joint n for displacements y (cascade) or directions
-// (forest).
-static double joint_row(ModelKind model, int joint, int column)
-{
-    int back = joint - column;
-    if (model == MODEL_FOREST) return back == 0 ? 1 : back == 1 ? -1 : 0;
-    return back == 0 ? 1 : back == 1 ? -2 : back == 2 ? 1 : 0;
-}
-
-// w^2 / k of the stiffest mode of N links: of D^T S D, S 2 at the root and 1 elsewhere. Node or
-// link n stands in column n - 1; in the cascade y0 = 0 and node -1 lies on the clamp.
-static double stiffest_mode(ModelKind model, int links)
-{
-    double m[MAX_LINKS * MAX_LINKS] = {0};
-    if (model == MODEL_SPRING) return 1.0;
-    for (int joint = 0; joint < links; ++joint)
-        for (int i = 0; i < links; ++i)
-            for (int j = 0; j < links; ++j)
-                m[i * links + j] +=
-                    (joint == 0 ? 2 : 1) * joint_row(model, joint, i) * joint_row(model, joint, j);
-    return largest_eigenvalue(m, links);
-}
-
 // Does a push of a thousandth of its length grow?
 static bool is_stable(ModelKind model, int links, float k, float damping)
 {
@@ -398,7 +355,7 @@ static void each_model_breaks_where_its_eigenvalues_say(void** state)
         for (int damped = 0; damped < 2; ++damped) {
             float damping = damped ? 30.0f : 2.0f;
             double c = exp(-(double)damping / 60.0);
-            double wanted = 2 * (1 + c) / stiffest_mode(cases[i].model, cases[i].links);
+            double wanted = 2 * (1 + c) / modes_stiffest(cases[i].model, cases[i].links, NULL);
             double found = boundary_of(cases[i].model, cases[i].links, damping);
             print_message("%s, %d links, c %.3f: k dt^2 %.4f, eigenvalues say %.4f\n",
                           models[cases[i].model].name, cases[i].links, c, found, wanted);
@@ -416,7 +373,7 @@ static void the_bound_that_is_refused_is_on_the_safe_side_and_near(void** state)
         straight(&strand, 7, vec3(0, -1, 0));
         d.rest = strand.rest;
         double bound = model_stiffness_bound(&d);
-        double modes = stiffest_mode((ModelKind)model, 7), steps = d.rate_hz * d.substeps;
+        double modes = modes_stiffest((ModelKind)model, 7, NULL), steps = d.rate_hz * d.substeps;
         double exact = 4.0 * steps * steps / modes;
         print_message("%s: refused from %.0f, breaks at %.0f\n", models[model].name, bound, exact);
         assert_true(bound <= exact * 1.0001 && bound > 0.8 * exact);

@@ -2,6 +2,7 @@
 // and sags too little. A failure here means that one of them has been mended, or broken further.
 #include "server/models.h"
 #include "server/strands.h"
+#include "tests/modes.h"
 #include "tests/strand.h"
 
 #include <math.h>
@@ -308,13 +309,7 @@ static SimDefinition stepped(int links, double k_dt2, double v_dt)
     return d;
 }
 
-// Eigenvalue of mode 1 ... N of the chain's Laplacian: q'' = -lambda (k q + v q') / J.
-static double laplacian(int links, int mode)
-{
-    double s = sin((2 * mode - 1) * 3.14159265358979 / (2 * (2 * links + 1)));
-    return 4 * s * s;
-}
-
+// q'' = -lambda (k q + v q') / J, lambda of the chain's Laplacian.
 // Each mode, alone, must go the way of q' = q + r dt, r' = r - lambda (k q + v r) dt: forward
 // Euler. Its roots stay within the circle iff k dt < v and lambda (v dt - k dt^2 / 2) < 2, so the
 // stiffest mode decides the second.
@@ -323,7 +318,7 @@ static void every_mode_of_the_printed_forest_is_forward_euler(void** state)
     (void)state;
     for (int mode = 1; mode <= 7; ++mode) {
         Strand strand;
-        double k = 0.15, v = 0.3, lambda = laplacian(7, mode), q = 1, r = 0, beta[8];
+        double k = 0.15, v = 0.3, lambda = modes_laplacian(7, mode), q = 1, r = 0, beta[8];
         straight(&strand, 7, vec3(0, -1, 0));
         start(&strand, stepped(7, k, v));
         const Block* block = &strand.sim->blocks[0];
@@ -363,7 +358,7 @@ static void the_printed_forest_breaks_where_its_eigenvalues_say(void** state)
     static const int lengths[] = {1, 7, 15};
     for (int i = 0; i < 3; ++i) {
         int links = lengths[i];
-        double stiffest = laplacian(links, links), k = 0.1, v = 0.3;
+        double stiffest = modes_laplacian(links, links), k = 0.1, v = 0.3;
         double low = 0.0, high = 1.0, most = 2 / stiffest + 0.5 * k;
         for (int pass = 0; pass < 12; ++pass)
             *(is_stable(links, 0.5 * (low + high), v) ? &low : &high) = 0.5 * (low + high);
@@ -396,6 +391,25 @@ static void what_is_beyond_the_printed_forests_bounds_is_refused(void** state)
         if (i > 0) assert_non_null(strstr(fault.text, "forest-z"));
         sim_destroy(sim);
     }
+}
+
+static void a_downward_share_beyond_one_is_taken_by_force_alone(void** state)
+{
+    (void)state;
+    Strand strand;
+    Fault fault = {0};
+    straight(&strand, 7, vec3(0, -1, 0));
+    SimDefinition d = bare(MODEL_CASCADE_THESIS, 7);
+    d.rest = strand.rest;
+    d.down_share = 1.5f;
+    assert_null(sim_create(&d, &fault));
+    assert_non_null(strstr(fault.text, "down_share"));
+    d.force = true;
+    Sim* sim = sim_create(&d, &fault);
+    assert_non_null(sim);
+    sim_destroy(sim);
+    d.down_share = -0.1f;
+    assert_null(sim_create(&d, &fault));
 }
 
 static uint64_t hash_of(const Strand* strand)
@@ -522,6 +536,7 @@ int main(void)
         cmocka_unit_test(every_mode_of_the_printed_forest_is_forward_euler),
         cmocka_unit_test(the_printed_forest_breaks_where_its_eigenvalues_say),
         cmocka_unit_test(what_is_beyond_the_printed_forests_bounds_is_refused),
+        cmocka_unit_test(a_downward_share_beyond_one_is_taken_by_force_alone),
         cmocka_unit_test(the_hash_sees_angles_and_rates),
         cmocka_unit_test(a_turn_leaves_the_angles_to_the_head),
         cmocka_unit_test(the_printed_forest_points_where_its_angles_say),
