@@ -186,7 +186,7 @@ static double nearest_link(const Trial* trial)
 static Point swept_at(const Panel* panel, double x, double y)
 {
     double radius = LINK_M / x, pearl = y * radius, least = 1e30;
-    Sphere sphere = {{0, 0, 0}, (float)radius};
+    Collider sphere = collider_sphere((Sphere){{0, 0, 0}, (float)radius});
     SimDefinition d = trial_bare(MODEL_PLAIN, LINKS);
     Trial trial;
     d.substeps = 4;
@@ -195,6 +195,7 @@ static Point swept_at(const Panel* panel, double x, double y)
     d.damping_per_s = 8;
     d.colliders = &sphere;
     d.collider_count = 1;
+    d.collide = panel->collide;
     d.pearl_radius_m = (float)pearl;
     trial_straight(&trial, LINKS, vec3(1, 0, 0));
     for (int n = 0; n <= LINKS; ++n)
@@ -228,14 +229,20 @@ static double chord_edge(const Panel* panel, double x, double y)
 void map_colliders(Points* points)
 {
     Panel panel = {.name = "pearl",
+                   .collide = COLLIDE_PEARL,
                    .x = {0.05, 2, 32, true},
                    .y = {0, 0.4, 32, false},
                    .measure = swept_at,
                    .derived = chord_edge,
                    .is_first_edge_alone = true};
     panel_measure(&panel, points);
+    panel.name = "segment";
+    panel.collide = COLLIDE_SEGMENT;
+    panel.derived = NULL; // nothing is cut at all
+    panel_measure(&panel, points);
     panel.name = "point"; // a pearl of no radius
-    panel.y = (Axis){-0.5, 0.5, 1, false};
+    panel.collide = COLLIDE_PEARL;
+    panel.y = (Scale){-0.5, 0.5, 1, false};
     panel.derived = NULL;
     int first = points->count;
     panel_measure(&panel, points);

@@ -304,7 +304,7 @@ void map_cascades(Points* points)
         panel_measure(&panel, points);
         panel.name = mended[i];
         panel.model = MODEL_CASCADE;
-        panel.y = (Axis){0.5, 1.5, 1, false}; // it has kd = ku, whatever the share
+        panel.y = (Scale){0.5, 1.5, 1, false}; // it has kd = ku, whatever the share
         panel_measure(&panel, points);
     }
 }
@@ -321,7 +321,7 @@ void map_forests(Points* points)
     panel_measure(&panel, points);
     panel.name = "forest";
     panel.model = MODEL_FOREST;
-    panel.y = (Axis){0, 1, 30, false}; // no step takes more than all of a velocity
+    panel.y = (Scale){0, 1, 30, false}; // no step takes more than all of a velocity
     panel.derived = symplectic_edge;
     panel_measure(&panel, points);
 }

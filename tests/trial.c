@@ -232,7 +232,7 @@ void points_judge(Points* points, const char* panel, const char* what, double go
     if (!(fabs(off) <= fabs(verdict->worst))) verdict->worst = off;
 }
 
-double axis_at(const Axis* axis, double i)
+double axis_at(const Scale* axis, double i)
 {
     double part = (i + 0.5) / axis->count;
     return axis->is_log ? axis->low * pow(axis->high / axis->low, part)

@@ -110,14 +110,14 @@ void points_add(Points* points, Point point);
 void points_judge(Points* points, const char* panel, const char* what, double got, double wanted,
                   bool is_relative);
 
-typedef struct Axis {
+typedef struct Scale {
     double low, high;
     int count;
     bool is_log;
-} Axis;
+} Scale;
 
 // The middle of bin i; with is_log the bins are alike in the logarithm.
-double axis_at(const Axis* axis, double i);
+double axis_at(const Scale* axis, double i);
 
 // A panel of a map: `measure` gives class and value at (x, y). `derived` gives where along x the
 // edge that was found at `x` should be, NAN where nothing is derived.
@@ -126,7 +126,8 @@ typedef struct Panel {
     ModelKind model;
     int fall_off;
     bool has_gravity;
-    Axis x, y;
+    CollideMode collide;
+    Scale x, y;
     Point (*measure)(const struct Panel* panel, double x, double y);
     double (*derived)(const struct Panel* panel, double x, double y);
     bool is_first_edge_alone;
