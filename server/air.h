@@ -10,22 +10,14 @@
 
 #include "server/strands.h"
 
-// Adds the wind to accelerations of nodes.
-static void air_drag(Block* block, const Substep* substep)
+// Acceleration `a` of a node at `p`, `before` a substep ago, with the wind's.
+INLINE Real3 air_drag(Real3 a, const Substep* substep, Real3 p, Real3 before)
 {
     real rate = (real)substep->drag / (real)substep->dt2;
-    real mx = (real)substep->air_move.x, my = (real)substep->air_move.y,
-         mz = (real)substep->air_move.z;
-    for (int n = 0; n < block->nodes; ++n) {
-        const Lanes3 *p = &block->position[n], *previous = &block->previous[n];
-        Lanes3* a = &block->acceleration[n];
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            a->x[l] += rate * (mx - (p->x[l] - previous->x[l]));
-            a->y[l] += rate * (my - (p->y[l] - previous->y[l]));
-            a->z[l] += rate * (mz - (p->z[l] - previous->z[l]));
-        }
-    }
+    a.x += rate * ((real)substep->air_move.x - (p.x - before.x));
+    a.y += rate * ((real)substep->air_move.y - (p.y - before.y));
+    a.z += rate * ((real)substep->air_move.z - (p.z - before.z));
+    return a;
 }
 
 // Adds the wind's force on node n to the load that a link carries (model_forest.h).

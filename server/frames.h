@@ -12,66 +12,68 @@
 // Built anew from the root each time: nothing drifts.
 #pragma once
 
-#include "server/strands.h"
+#include "server/roots.h"
 
 #define FOLDED 1e-4f // 1 + cos of an angle taken for 180 degrees
 
-// way of link n, and its direction in `d`
-static inline void frames_direction(const Block* block, int n, Lanes3* d)
+// Of link n, where nodes are or were.
+static inline void frames_direction(const Lanes3* nodes, int n, Lanes3* direction)
 {
-    const Lanes3* p = &block->position[n - 1];
-    const Lanes3* q = &block->position[n];
+    const Lanes3 *inner = &nodes[n - 1], *outer = &nodes[n];
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
-        real x = q->x[l] - p->x[l], y = q->y[l] - p->y[l], z = q->z[l] - p->z[l];
-        real length = real_sqrt(x * x + y * y + z * z);
-        real inverse = 1 / (length > LEAST_LENGTH_M ? length : LEAST_LENGTH_M);
-        d->x[l] = x * inverse;
-        d->y[l] = y * inverse;
-        d->z[l] = z * inverse;
+        Real3 link = real3_sub(lane_load(outer, l), lane_load(inner, l));
+        real length = real_sqrt(real3_dot(link, link));
+        real inverse = 1 / real_at_least(length, LEAST_LENGTH_M);
+        lane_store(direction, l, real3_scale(link, inverse));
     }
 }
 
-// The head is the frame before link 1: `along` and `across` of it are in head space.
-static inline void frames_of_head(const Lanes3* from, const float rotation[9], Lanes3* to)
+// `local` of the frame (d, u, w), in world axes.
+INLINE Real3 frames_apply(Real3 local, Real3 d, Real3 u, Real3 w)
 {
-    real m[9];
-    for (int i = 0; i < 9; ++i)
-        m[i] = (real)rotation[i];
-    LANE_LOOP
-    for (int l = 0; l < LANES; ++l) {
-        to->x[l] = m[0] * from->x[l] + m[1] * from->y[l] + m[2] * from->z[l];
-        to->y[l] = m[3] * from->x[l] + m[4] * from->y[l] + m[5] * from->z[l];
-        to->z[l] = m[6] * from->x[l] + m[7] * from->y[l] + m[8] * from->z[l];
-    }
+    return (Real3){local.x * d.x + local.y * u.x + local.z * w.x,
+                   local.x * d.y + local.y * u.y + local.z * w.y,
+                   local.x * d.z + local.y * u.z + local.z * w.z};
 }
 
-// `local` of the frame (d, u, d x u), in world axes.
-static inline void frames_apply(const Lanes3* local, const Lanes3* d, const Lanes3* u, Lanes3* to)
+// `u` taken along by the rotation from `a` to `d`.
+INLINE Real3 frames_transport(Real3 u, Real3 a, Real3 d)
 {
-    LANE_LOOP
-    for (int l = 0; l < LANES; ++l) {
-        real dx = d->x[l], dy = d->y[l], dz = d->z[l], ux = u->x[l], uy = u->y[l], uz = u->z[l];
-        real wx = dy * uz - dz * uy, wy = dz * ux - dx * uz, wz = dx * uy - dy * ux;
-        real i = local->x[l], j = local->y[l], k = local->z[l];
-        to->x[l] = i * dx + j * ux + k * wx;
-        to->y[l] = i * dy + j * uy + k * wy;
-        to->z[l] = i * dz + j * uz + k * wz;
-    }
+    Real3 b = real3_cross(a, d), bu = real3_cross(b, u);
+    real c = real3_dot(a, d);
+    real f = real3_dot(b, u) / real_at_least(1 + c, FOLDED);
+    return (Real3){c * u.x + bu.x + b.x * f, c * u.y + bu.y + b.y * f, c * u.z + bu.z + b.z * f};
 }
 
-// Takes `u` along by the rotation from `a` to `d`.
-static inline void frames_transport(Lanes3* u, const Lanes3* a, const Lanes3* d)
+// The head is the frame before link 1: what is local to it is in head space.
+static inline void frames_first(Block* block, const Substep* substep, Lanes3* second)
 {
+    roots_turn_lanes(&block->along[1], substep->rotation, &block->predicted[1]);
+    roots_turn_lanes(&block->across[1], substep->rotation, second);
+    roots_turn_lanes(&block->carried[1], substep->rotation, &block->moment[1]);
+    LANE_LOOP
+    for (int l = 0; l < LANES; ++l)
+        lane_store(second, l,
+                   frames_transport(lane_load(second, l), lane_load(&block->predicted[1], l),
+                                    lane_load(&block->direction[1], l)));
+}
+
+// Link n from the link before; `second` is the frame's second axis, of that link and then of this.
+static inline void frames_next(Block* block, int n, Lanes3* second)
+{
+    const Lanes3 *along = &block->along[n], *across = &block->across[n];
+    const Lanes3* carried = &block->carried[n];
+    const Lanes3 *before = &block->direction[n - 1], *direction = &block->direction[n];
+    Lanes3 *predicted = &block->predicted[n], *moment = &block->moment[n];
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
-        real ax = a->x[l], ay = a->y[l], az = a->z[l], dx = d->x[l], dy = d->y[l], dz = d->z[l];
-        real bx = ay * dz - az * dy, by = az * dx - ax * dz, bz = ax * dy - ay * dx;
-        real c = ax * dx + ay * dy + az * dz, ux = u->x[l], uy = u->y[l], uz = u->z[l];
-        real f = (bx * ux + by * uy + bz * uz) / (1 + c > FOLDED ? 1 + c : FOLDED);
-        u->x[l] = c * ux + (by * uz - bz * uy) + bx * f;
-        u->y[l] = c * uy + (bz * ux - bx * uz) + by * f;
-        u->z[l] = c * uz + (bx * uy - by * ux) + bz * f;
+        Real3 d = lane_load(before, l), u = lane_load(second, l), w = real3_cross(d, u);
+        Real3 a = frames_apply(lane_load(along, l), d, u, w);
+        Real3 next = frames_apply(lane_load(across, l), d, u, w);
+        lane_store(moment, l, frames_apply(lane_load(carried, l), d, u, w));
+        lane_store(predicted, l, a);
+        lane_store(second, l, frames_transport(next, a, lane_load(direction, l)));
     }
 }
 
@@ -79,22 +81,28 @@ static inline void frames_transport(Lanes3* u, const Lanes3* a, const Lanes3* d)
 // rest.
 static void frames_follow(Block* block, const Substep* substep)
 {
-    Lanes3 u, next;
+    Lanes3 second;
+    for (int n = 1; n < block->nodes; ++n)
+        frames_direction(block->position, n, &block->direction[n]);
+    frames_first(block, substep, &second);
+    for (int n = 2; n < block->nodes; ++n)
+        frames_next(block, n, &second);
+}
+
+// Puts every node where its link's direction has it, from the root's place on.
+static void frames_place(Block* block)
+{
+    block->previous[0] = block->position[0];
+    block->position[0] = block->reference[0];
     for (int n = 1; n < block->nodes; ++n) {
-        Lanes3* d = &block->direction[n];
-        Lanes3* a = &block->predicted[n];
-        const Lanes3* before = &block->direction[n - 1];
-        if (n == 1) {
-            frames_of_head(&block->along[1], substep->rotation, a);
-            frames_of_head(&block->across[1], substep->rotation, &next);
-            frames_of_head(&block->carried[1], substep->rotation, &block->moment[1]);
-        } else {
-            frames_apply(&block->along[n], before, &u, a);
-            frames_apply(&block->across[n], before, &u, &next);
-            frames_apply(&block->carried[n], before, &u, &block->moment[n]);
+        const Lanes3 *inner = &block->position[n - 1], *direction = &block->direction[n];
+        Lanes3 *position = &block->position[n], *previous = &block->previous[n];
+        const real* length = block->length[n].v;
+        LANE_LOOP
+        for (int l = 0; l < LANES; ++l) {
+            lane_store(previous, l, lane_load(position, l));
+            lane_store(position, l,
+                       real3_mad(lane_load(inner, l), lane_load(direction, l), length[l]));
         }
-        frames_direction(block, n, d);
-        u = next;
-        frames_transport(&u, a, d);
     }
 }

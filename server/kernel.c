@@ -31,17 +31,17 @@
 
 // A model is a file of forces, and how they move nodes: a row.
 typedef struct Stages {
-    void (*accelerate)(Block*, const Substep*);
-    void (*integrate)(Block*, const Substep*);
+    void (*accelerate)(Block*, const Substep*); // NULL where no node asks for another
+    void (*move)(Block*, const Substep*);
     bool keeps_lengths; // by itself
 } Stages;
 
 static const Stages stages[MODEL_COUNT] = {
-    [MODEL_SPRING] = {spring_accelerate, integrate_verlet, false},
-    [MODEL_CASCADE] = {cascade_accelerate, integrate_verlet, false},
+    [MODEL_SPRING] = {NULL, spring_move, false},
+    [MODEL_CASCADE] = {cascade_accelerate, integrate_accelerated, false},
     [MODEL_FOREST] = {forest_accelerate, forest_swing, true},
-    [MODEL_PLAIN] = {plain_accelerate, integrate_verlet, false},
-    [MODEL_CASCADE_THESIS] = {cascade_thesis_accelerate, integrate_verlet, false},
+    [MODEL_PLAIN] = {NULL, plain_move, false},
+    [MODEL_CASCADE_THESIS] = {cascade_thesis_accelerate, integrate_accelerated, false},
     [MODEL_FOREST_Z] = {forest_z_accelerate, forest_z_turn, true},
 };
 
@@ -51,9 +51,8 @@ static void substep(Block* blocks, int count, const Substep* s, const Stages* mo
 {
     for (int b = 0; b < count; ++b) {
         roots_place(&blocks[b], s->rotation);
-        model->accelerate(&blocks[b], s);
-        if (s->drag > 0 && !model->keeps_lengths) air_drag(&blocks[b], s);
-        model->integrate(&blocks[b], s);
+        if (model->accelerate != NULL) model->accelerate(&blocks[b], s);
+        model->move(&blocks[b], s);
         shape_blend(&blocks[b]);
     }
     if (!model->keeps_lengths && s->solve_directly) length_solve(blocks, count, s->iterations);
@@ -69,7 +68,7 @@ static void step(Block* blocks, int count, const Substep* substeps, int substep_
     for (int s = 0; s < substep_count; ++s)
         substep(blocks, count, &substeps[s], &stages[substeps[s].model]);
     for (int b = 0; b < count; ++b)
-        quarantine_lost(&blocks[b]);
+        quarantine_lost(&blocks[b], substeps[substep_count - 1].rotation);
 }
 
 #define JOIN(a, b)   JOINED(a, b)

@@ -17,7 +17,7 @@ static inline void length_correct_link(Block* block, int n)
     for (int l = 0; l < LANES; ++l) {
         real x = b->x[l] - a->x[l], y = b->y[l] - a->y[l], z = b->z[l] - a->z[l];
         real d = real_sqrt(x * x + y * y + z * z);
-        d = d > LEAST_LENGTH_M ? d : LEAST_LENGTH_M;
+        d = real_at_least(d, LEAST_LENGTH_M);
         real error = d - rest[l];
         real excess = error / d;
         excess = real_abs(error) > RESOLVED_M ? excess : 0;
@@ -34,15 +34,12 @@ static inline void length_correct_link(Block* block, int n)
 // Sweeps from root to tip. One leaves a hanging strand's link n longer by (N - n) g dt^2 / d of
 // itself (notes/simulation.md 4.2); tip to root would leave 30 % more.
 //
-// The sweeps run as a wave, each two links behind the one before it, and two blocks run side by
-// side: what is in work at a time touches other nodes, so the processor does not wait for one
-// link's square root to begin another's, and every number is the same as of one sweep after
-// another.
+// Blocks run side by side: while one waits for its square root, the other is worked on.
 static void length_correct(Block* blocks, int count, int sweeps)
 {
     int nodes = blocks[0].nodes;
-    for (int front = 1; front < nodes + 2 * (sweeps - 1); ++front)
-        for (int sweep = 0, n = front; sweep < sweeps && n >= 1; ++sweep, n -= 2)
-            for (int b = 0; b < count && n < nodes; ++b)
+    for (int sweep = 0; sweep < sweeps; ++sweep)
+        for (int n = 1; n < nodes; ++n)
+            for (int b = 0; b < count; ++b)
                 length_correct_link(&blocks[b], n);
 }

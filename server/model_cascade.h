@@ -12,81 +12,40 @@
 
 #include "server/frames.h"
 
-static void cascade_weigh(Block* block, const Substep* substep)
-{
-    real gravity = (real)substep->gravity_m_s2;
-    for (int n = 0; n < block->nodes; ++n) {
-        Lanes3* f = &block->acceleration[n];
-        const Lanes* mass = &block->mass[n];
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            f->x[l] = 0;
-            f->y[l] = -gravity * mass->v[l];
-            f->z[l] = 0;
-        }
-    }
-}
+// What one link has of the next one out, past the tip nothing.
+typedef struct CascadeOutboard {
+    Lanes3 moment, force;
+} CascadeOutboard;
 
-// Adds K (d x a), the moment that turns d towards a.
-static inline void cascade_spring(Block* block, int n)
+// On link n act the moment of joint n, K (d x a) and what carries the weight at rest, and against
+// it that of joint n + 1: together a couple of forces, moment x d / length at the outer end and the
+// opposite at the inner one. Node n has one end of link n and one of link n + 1.
+static inline void cascade_link(Block* block, int n, real gravity, CascadeOutboard* outboard)
 {
-    const Lanes3 *d = &block->direction[n], *a = &block->predicted[n];
-    Lanes3* moment = &block->moment[n];
-    const real* hinge = block->hinge[n].v;
+    const Lanes3 *direction = &block->direction[n], *predicted = &block->predicted[n];
+    const Lanes3* carried = &block->moment[n];
+    const real *hinge = block->hinge[n].v, *per_length = block->per_length[n].v;
+    const real* per_mass = block->per_mass[n].v;
+    Lanes3* acceleration = &block->acceleration[n];
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
-        real dx = d->x[l], dy = d->y[l], dz = d->z[l], ax = a->x[l], ay = a->y[l], az = a->z[l];
-        moment->x[l] += hinge[l] * (dy * az - dz * ay);
-        moment->y[l] += hinge[l] * (dz * ax - dx * az);
-        moment->z[l] += hinge[l] * (dx * ay - dy * ax);
-    }
-}
-
-// `sign` times the moment of joint `joint` on link n, as a couple: moment x d / length at the outer
-// end, the opposite at the inner one.
-static inline void cascade_couple(Block* block, int joint, int n, real sign)
-{
-    const Lanes3 *moment = &block->moment[joint], *d = &block->direction[n];
-    Lanes3 *inner = &block->acceleration[n - 1], *outer = &block->acceleration[n];
-    const real* length = block->length[n].v;
-    LANE_LOOP
-    for (int l = 0; l < LANES; ++l) {
-        real k = sign / (length[l] > LEAST_LENGTH_M ? length[l] : LEAST_LENGTH_M);
-        real fx = k * (moment->y[l] * d->z[l] - moment->z[l] * d->y[l]);
-        real fy = k * (moment->z[l] * d->x[l] - moment->x[l] * d->z[l]);
-        real fz = k * (moment->x[l] * d->y[l] - moment->y[l] * d->x[l]);
-        outer->x[l] += fx;
-        outer->y[l] += fy;
-        outer->z[l] += fz;
-        inner->x[l] -= fx;
-        inner->y[l] -= fy;
-        inner->z[l] -= fz;
-    }
-}
-
-static void cascade_divide_by_mass(Block* block)
-{
-    for (int n = 1; n < block->nodes; ++n) {
-        Lanes3* f = &block->acceleration[n];
-        const Lanes* mass = &block->mass[n];
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            real inverse = 1 / mass->v[l];
-            f->x[l] *= inverse;
-            f->y[l] *= inverse;
-            f->z[l] *= inverse;
-        }
+        Real3 d = lane_load(direction, l), a = lane_load(predicted, l);
+        Real3 moment = real3_mad(lane_load(carried, l), real3_cross(d, a), hinge[l]);
+        Real3 turning = real3_sub(moment, lane_load(&outboard->moment, l));
+        Real3 force = real3_scale(real3_cross(turning, d), per_length[l]);
+        Real3 sum = real3_sub(force, lane_load(&outboard->force, l));
+        sum = real3_scale(sum, per_mass[l]);
+        sum.y -= gravity;
+        lane_store(acceleration, l, sum);
+        lane_store(&outboard->moment, l, moment);
+        lane_store(&outboard->force, l, force);
     }
 }
 
 static void cascade_accelerate(Block* block, const Substep* substep)
 {
+    CascadeOutboard outboard = {0};
     frames_follow(block, substep);
-    cascade_weigh(block, substep);
-    for (int n = 1; n < block->nodes; ++n) {
-        cascade_spring(block, n);
-        cascade_couple(block, n, n, 1);
-        if (n > 1) cascade_couple(block, n, n - 1, -1); // the head takes the root's
-    }
-    cascade_divide_by_mass(block);
+    for (int n = block->nodes - 1; n >= 1; --n)
+        cascade_link(block, n, (real)substep->gravity_m_s2, &outboard);
 }

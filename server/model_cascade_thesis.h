@@ -20,7 +20,7 @@
 #pragma once
 
 #include "server/frames.h"
-#include "server/model_plain.h"
+#include "server/roots.h"
 
 // The space of link n: N in direction[n], B in predicted[n], and T in place of the T before.
 static inline void cascade_thesis_space(Block* block, int n, Lanes3* t)
@@ -59,16 +59,27 @@ static inline void cascade_thesis_pull(Block* block, int n, const Lanes3* t, int
 
 // "The first tangent space for the connection point on the scalp is given": node 1's place in it is
 // its rest place under the head.
-static inline void cascade_thesis_root(Block* block)
+static inline void cascade_thesis_root(Block* block, const Substep* substep)
 {
-    const Lanes3 *reference = &block->reference[1], *p = &block->position[1];
+    const Lanes3 *rest = &block->rest[1], *position = &block->position[1];
     const real* k = block->stiffness[0].v;
     Lanes3* a = &block->acceleration[1];
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
-        a->x[l] += k[l] * (reference->x[l] - p->x[l]);
-        a->y[l] += k[l] * (reference->y[l] - p->y[l]);
-        a->z[l] += k[l] * (reference->z[l] - p->z[l]);
+        Real3 to = roots_turn(substep->rotation, lane_load(rest, l)), p = lane_load(position, l);
+        a->x[l] += k[l] * (to.x - p.x);
+        a->y[l] += k[l] * (to.y - p.y);
+        a->z[l] += k[l] * (to.z - p.z);
+    }
+}
+
+static inline void cascade_thesis_fall(Block* block, const Substep* substep)
+{
+    for (int n = 0; n < block->nodes; ++n) {
+        Lanes3* a = &block->acceleration[n];
+        LANE_LOOP
+        for (int l = 0; l < LANES; ++l)
+            lane_store(a, l, (Real3){0, -(real)substep->gravity_m_s2, 0});
     }
 }
 
@@ -76,11 +87,11 @@ static inline void cascade_thesis_root(Block* block)
 static void cascade_thesis_accelerate(Block* block, const Substep* substep)
 {
     Lanes3 t;
-    frames_of_head(&block->across[1], substep->rotation, &t);
-    plain_accelerate(block, substep);
-    cascade_thesis_root(block);
+    roots_turn_lanes(&block->across[1], substep->rotation, &t);
+    cascade_thesis_fall(block, substep);
+    cascade_thesis_root(block, substep);
     for (int n = 1; n < block->nodes; ++n) {
-        frames_direction(block, n, &block->direction[n]);
+        frames_direction(block->position, n, &block->direction[n]);
         cascade_thesis_space(block, n, &t);
         if (n + 1 < block->nodes)
             cascade_thesis_pull(block, n, &t, n + 1, &block->upward[n + 1], &block->stiffness[n],

@@ -15,135 +15,106 @@
 
 #include "server/air.h"
 #include "server/frames.h"
+#include "server/integrate.h"
 
-#define LEAST_HALF   1e-3f // cos of half the angle of a joint that counts as folded
-#define LONGEST_ARC2 0.81f // squared sine of the most that a link turns in a substep
+#define LEAST_HALF 1e-3f // cos of half the angle of a joint that counts as folded
 
 // phi / sin(phi) for c = cos(phi): from q = tan(phi / 4), phi = 4 atan(q). The polynomial is
-// Chebyshev's of degree 8 in q^2 on 0..1: within 2e-8.
+// Chebyshev's of degree 8 in s = q^2 on 0..1, within 2e-8; its odd and even powers apart, because a
+// sum waits for the one before.
 static inline real forest_arc(real c)
 {
-    real h2 = (1 + c) * (real)0.5;
-    real h = real_sqrt(h2 > 0 ? h2 : 0);
-    h = h > LEAST_HALF ? h : LEAST_HALF;
-    real s = (1 - h) / (1 + h);
-    s = s > 0 ? s : 0;
-    real p = (real)0.0027662835283182277;
-    p = p * s - (real)0.015731249223588546;
-    p = p * s + (real)0.04213762374570251;
-    p = p * s - (real)0.07456854838521723;
-    p = p * s + (real)0.10618370642479312;
-    p = p * s - (real)0.1419779779540799;
-    p = p * s + (real)0.1999187202926431;
-    p = p * s - (real)0.3333303670929285;
-    p = p * s + (real)0.9999999817886558;
-    return 2 * p / (h * (1 + h));
+    real h = real_at_least(real_sqrt(real_at_least((1 + c) * (real)0.5, 0)), LEAST_HALF);
+    real inverse = 1 / (h * (1 + h)), s = real_at_least((1 - h) * h * inverse, 0), s2 = s * s;
+    real even = (real)0.0027662835283182277, odd = (real)-0.015731249223588546;
+    even = even * s2 + (real)0.04213762374570251;
+    odd = odd * s2 - (real)0.07456854838521723;
+    even = even * s2 + (real)0.10618370642479312;
+    odd = odd * s2 - (real)0.1419779779540799;
+    even = even * s2 + (real)0.1999187202926431;
+    odd = odd * s2 - (real)0.3333303670929285;
+    even = even * s2 + (real)0.9999999817886558;
+    return 2 * (even + odd * s) * inverse;
 }
 
-// Adds K phi about d x a to the moments of the joints.
-static void forest_joints(Block* block)
+// Adds K phi about d x a to the moment of joint n. A loop of its own: with the next one it would be
+// too long for the processor to begin the next lanes while it waits for this root and division.
+static inline void forest_joint(Block* block, int n)
 {
-    Lanes3* moment = block->moment;
-    for (int n = 1; n < block->nodes; ++n) {
-        const Lanes3 *d = &block->direction[n], *a = &block->predicted[n];
-        const real* hinge = block->hinge[n].v;
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            real dx = d->x[l], dy = d->y[l], dz = d->z[l], ax = a->x[l], ay = a->y[l], az = a->z[l];
-            real k = hinge[l] * forest_arc(ax * dx + ay * dy + az * dz);
-            moment[n].x[l] += k * (dy * az - dz * ay);
-            moment[n].y[l] += k * (dz * ax - dx * az);
-            moment[n].z[l] += k * (dx * ay - dy * ax);
-        }
+    const Lanes3 *direction = &block->direction[n], *predicted = &block->predicted[n];
+    const real* hinge = block->hinge[n].v;
+    Lanes3* moment = &block->moment[n];
+    LANE_LOOP
+    for (int l = 0; l < LANES; ++l) {
+        Real3 d = lane_load(direction, l), a = lane_load(predicted, l);
+        real k = hinge[l] * forest_arc(real3_dot(a, d));
+        lane_store(moment, l, real3_mad(lane_load(moment, l), real3_cross(d, a), k));
     }
 }
 
-// direction'' = (moment / (m L^2)) x d, tip first: `load` gathers the forces outboard. The last
-// link passes nothing in.
-static void forest_turn(Block* block, const Substep* substep)
+// direction'' of link n = (moment / (m L^2)) x d. The moment is its joint's less the next one's,
+// which is zero past the tip, and that of the load at its end: `load` gathers the forces outboard.
+// `push` is what acts on every mass.
+static inline void forest_turn(Block* block, int n, Real3 push, Lanes3* load)
 {
-    const Lanes3* moment = block->moment;
-    real dt2 = (real)substep->dt2, gravity = (real)substep->gravity_m_s2;
-    real hx = -(real)substep->second_difference.x / dt2;
-    real hy = -(real)substep->second_difference.y / dt2;
-    real hz = -(real)substep->second_difference.z / dt2;
-    Lanes3 load = {0};
-    for (int n = block->nodes - 1; n >= 1; --n) {
-        const Lanes3 *d = &block->direction[n], *m = &moment[n], *next = &moment[n + 1];
-        const real *mass = block->mass[n].v, *length = block->length[n].v;
-        Lanes3* out = &block->acceleration[n];
-        bool is_tip = n == block->nodes - 1;
-        real share = is_tip || !substep->outermost ? 1 : 0;
-        if (substep->drag > 0) air_load(block, substep, n, &load);
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            real dx = d->x[l], dy = d->y[l], dz = d->z[l];
-            real inverse = 1 / (length[l] > LEAST_LENGTH_M ? length[l] : LEAST_LENGTH_M);
-            real fx = load.x[l] + mass[l] * share * hx;
-            real fy = load.y[l] + mass[l] * (share * hy - gravity);
-            real fz = load.z[l] + mass[l] * share * hz;
-            load.x[l] = fx;
-            load.y[l] = fy;
-            load.z[l] = fz;
-            real tx = (m->x[l] - next->x[l]) * inverse + (dy * fz - dz * fy);
-            real ty = (m->y[l] - next->y[l]) * inverse + (dz * fx - dx * fz);
-            real tz = (m->z[l] - next->z[l]) * inverse + (dx * fy - dy * fx);
-            out->x[l] = inverse * (ty * dz - tz * dy);
-            out->y[l] = inverse * (tz * dx - tx * dz);
-            out->z[l] = inverse * (tx * dy - ty * dx);
-        }
+    const Lanes3 *direction = &block->direction[n], *moment = &block->moment[n],
+                 *next = &block->moment[n + 1];
+    const real *mass = block->mass[n].v, *per_length = block->per_length[n].v;
+    Lanes3* acceleration = &block->acceleration[n];
+    LANE_LOOP
+    for (int l = 0; l < LANES; ++l) {
+        Real3 d = lane_load(direction, l);
+        Real3 force = real3_mad(lane_load(load, l), push, mass[l]);
+        Real3 turning = real3_sub(lane_load(moment, l), lane_load(next, l));
+        turning = real3_mad(real3_cross(d, force), turning, per_length[l]);
+        lane_store(acceleration, l, real3_scale(real3_cross(turning, d), per_length[l]));
+        lane_store(load, l, force);
     }
 }
 
 static void forest_accelerate(Block* block, const Substep* substep)
 {
+    Lanes3 load = {0};
+    real dt2 = (real)substep->dt2, gravity = (real)substep->gravity_m_s2;
     frames_follow(block, substep);
-    forest_joints(block);
-    forest_turn(block, substep);
+    for (int n = 1; n < block->nodes; ++n)
+        forest_joint(block, n);
+    for (int n = block->nodes - 1; n >= 1; --n) {
+        real share = n == block->nodes - 1 || !substep->outermost ? 1 : 0;
+        Real3 push = {-share * (real)substep->second_difference.x / dt2,
+                      -share * (real)substep->second_difference.y / dt2 - gravity,
+                      -share * (real)substep->second_difference.z / dt2};
+        if (substep->drag > 0) air_load(block, substep, n, &load);
+        forest_turn(block, n, push, &load);
+    }
 }
 
-// Verlet on the sphere, from the root outwards. With e the direction a substep ago, u = (d.e) d - e
-// is the arc's chord across d, and d' = q + sqrt(1 - q.q) d with q = c u + dt^2 d''.
+// Verlet on the sphere. With e the direction a substep ago, (d.e) d - e is the sine of the last
+// arc, across d; times 2 / (1 + d.e) it is 2 tan of half of it, which the damping and the force
+// change. An arc is got back from that without a root, and none is too long.
+static inline void forest_swing_link(Block* block, int n, real c, real dt2)
+{
+    const Lanes3* before = &block->predicted[n];
+    const Lanes3* acceleration = &block->acceleration[n];
+    Lanes3* direction = &block->direction[n];
+    LANE_LOOP
+    for (int l = 0; l < LANES; ++l) {
+        Real3 d = lane_load(direction, l), e = lane_load(before, l);
+        real cosine = real3_dot(d, e);
+        real kept = 2 * c / real_at_least(1 + cosine, FOLDED);
+        Real3 q = real3_scale(real3_sub(real3_scale(d, cosine), e), kept);
+        q = real3_mad(q, lane_load(acceleration, l), dt2);
+        q = (Real3){settle(q.x), settle(q.y), settle(q.z)};
+        real tan2 = (real)0.25 * real3_dot(q, q), inverse = 1 / (1 + tan2);
+        lane_store(direction, l, real3_mad(real3_scale(q, inverse), d, (1 - tan2) * inverse));
+    }
+}
+
 static void forest_swing(Block* block, const Substep* substep)
 {
-    real c = (real)substep->velocity_kept, dt2 = (real)substep->dt2;
-    Lanes3 was = block->previous[0]; // of node n - 1, a substep before
-    block->previous[0] = block->position[0];
-    block->position[0] = block->reference[0];
-    for (int n = 1; n < block->nodes; ++n) {
-        const Lanes3 *d = &block->direction[n], *a = &block->acceleration[n];
-        const Lanes3* inner = &block->position[n - 1];
-        Lanes3 *p = &block->position[n], *previous = &block->previous[n];
-        const real* length = block->length[n].v;
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            real dx = d->x[l], dy = d->y[l], dz = d->z[l];
-            real ex = previous->x[l] - was.x[l], ey = previous->y[l] - was.y[l],
-                 ez = previous->z[l] - was.z[l];
-            real e2 = real_sqrt(ex * ex + ey * ey + ez * ez);
-            real inverse = 1 / (e2 > LEAST_LENGTH_M ? e2 : LEAST_LENGTH_M);
-            ex *= inverse;
-            ey *= inverse;
-            ez *= inverse;
-            real cosine = dx * ex + dy * ey + dz * ez;
-            real qx = c * (cosine * dx - ex) + dt2 * a->x[l];
-            real qy = c * (cosine * dy - ey) + dt2 * a->y[l];
-            real qz = c * (cosine * dz - ez) + dt2 * a->z[l];
-            real q2 = qx * qx + qy * qy + qz * qz;
-            real most = real_sqrt(LONGEST_ARC2 / (q2 > LONGEST_ARC2 ? q2 : LONGEST_ARC2));
-            qx = settle(qx * most);
-            qy = settle(qy * most);
-            qz = settle(qz * most);
-            real along = real_sqrt(1 - most * most * q2);
-            was.x[l] = previous->x[l];
-            was.y[l] = previous->y[l];
-            was.z[l] = previous->z[l];
-            previous->x[l] = p->x[l];
-            previous->y[l] = p->y[l];
-            previous->z[l] = p->z[l];
-            p->x[l] = inner->x[l] + length[l] * (qx + along * dx);
-            p->y[l] = inner->y[l] + length[l] * (qy + along * dy);
-            p->z[l] = inner->z[l] + length[l] * (qz + along * dz);
-        }
-    }
+    for (int n = 1; n < block->nodes; ++n)
+        frames_direction(block->previous, n, &block->predicted[n]);
+    for (int n = 1; n < block->nodes; ++n)
+        forest_swing_link(block, n, (real)substep->velocity_kept, (real)substep->dt2);
+    frames_place(block);
 }

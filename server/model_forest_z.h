@@ -20,6 +20,7 @@
 
 #include "server/frames.h"
 #include "server/integrate.h"
+#include "server/roots.h"
 
 // The nearest whole number without a conversion or a call: what is added pushes the fraction out.
 #ifdef SIM_DOUBLE
@@ -65,8 +66,8 @@ static inline void forest_z_sincos(real x, real* sine, real* cosine)
 static inline void forest_z_head(Block* block, const float rotation[9])
 {
     Lanes3 *x = &block->moment[1], *y = &block->predicted[0], *z = &block->direction[0];
-    frames_of_head(&block->along[1], rotation, z);
-    frames_of_head(&block->across[1], rotation, x);
+    roots_turn_lanes(&block->along[1], rotation, z);
+    roots_turn_lanes(&block->across[1], rotation, x);
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
         y->x[l] = z->y[l] * x->z[l] - z->z[l] * x->y[l];
@@ -207,30 +208,11 @@ static inline void forest_z_euler(Block* block, int n, real dt)
     }
 }
 
-static inline void forest_z_place(Block* block, int n)
-{
-    const Lanes3 *inner = &block->position[n - 1], *z = &block->direction[n];
-    Lanes3 *p = &block->position[n], *previous = &block->previous[n];
-    const real* length = block->length[n].v;
-    LANE_LOOP
-    for (int l = 0; l < LANES; ++l) {
-        previous->x[l] = p->x[l];
-        previous->y[l] = p->y[l];
-        previous->z[l] = p->z[l];
-        p->x[l] = inner->x[l] + length[l] * z->x[l];
-        p->y[l] = inner->y[l] + length[l] * z->y[l];
-        p->z[l] = inner->z[l] + length[l] * z->z[l];
-    }
-}
-
 static void forest_z_turn(Block* block, const Substep* substep)
 {
     block->acceleration[0] = (Lanes3){0}; // the head's own is not known
     for (int n = 1; n < block->nodes; ++n)
         forest_z_euler(block, n, (real)substep->dt);
     forest_z_frames(block, substep->rotation);
-    block->previous[0] = block->position[0];
-    block->position[0] = block->reference[0];
-    for (int n = 1; n < block->nodes; ++n)
-        forest_z_place(block, n);
+    frames_place(block);
 }

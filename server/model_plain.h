@@ -2,18 +2,15 @@
 // to. What it hangs in is gravity alone, so that is never compensated.
 #pragma once
 
-#include "server/strands.h"
+#include "server/integrate.h"
 
-static void plain_accelerate(Block* block, const Substep* substep)
+INLINE Real3 plain_fall(const Block* block, const Substep* substep, int n, int l)
 {
-    real gravity = (real)substep->gravity_m_s2;
-    for (int n = 0; n < block->nodes; ++n) {
-        Lanes3* a = &block->acceleration[n];
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            a->x[l] = 0;
-            a->y[l] = -gravity;
-            a->z[l] = 0;
-        }
-    }
+    (void)block, (void)n, (void)l;
+    return (Real3){0, -(real)substep->gravity_m_s2, 0};
+}
+
+static void plain_move(Block* block, const Substep* substep)
+{
+    integrate_verlet(block, substep, plain_fall);
 }

@@ -8,22 +8,20 @@
 // leaving both out (sim.c), which is also exact in float.
 #pragma once
 
-#include "server/strands.h"
+#include "server/integrate.h"
+#include "server/roots.h"
 
 // acceleration = k/m (reference - position) - up gravity
-static void spring_accelerate(Block* block, const Substep* substep)
+INLINE Real3 spring_pull(const Block* block, const Substep* substep, int n, int l)
 {
-    real gravity = (real)substep->gravity_m_s2;
-    for (int n = 0; n < block->nodes; ++n) {
-        const Lanes* k = &block->stiffness[n];
-        const Lanes3* p = &block->position[n];
-        const Lanes3* reference = &block->reference[n];
-        Lanes3* a = &block->acceleration[n];
-        LANE_LOOP
-        for (int l = 0; l < LANES; ++l) {
-            a->x[l] = k->v[l] * (reference->x[l] - p->x[l]);
-            a->y[l] = k->v[l] * (reference->y[l] - p->y[l]) - gravity;
-            a->z[l] = k->v[l] * (reference->z[l] - p->z[l]);
-        }
-    }
+    real k = block->stiffness[n].v[l];
+    Real3 p = lane_load(&block->position[n], l);
+    Real3 reference = roots_turn(substep->rotation, lane_load(&block->rest[n], l));
+    return (Real3){k * (reference.x - p.x), k * (reference.y - p.y) - (real)substep->gravity_m_s2,
+                   k * (reference.z - p.z)};
+}
+
+static void spring_move(Block* block, const Substep* substep)
+{
+    integrate_verlet(block, substep, spring_pull);
 }

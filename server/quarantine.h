@@ -5,7 +5,7 @@
 // the machine do, and NaN never heals: every later tick of the strand would be one.
 #pragma once
 
-#include "server/strands.h"
+#include "server/roots.h"
 
 static inline void quarantine_measure(const Lanes3* p, real* squares)
 {
@@ -26,28 +26,28 @@ static inline bool is_lost(const Block* block, int l)
     return false;
 }
 
-static inline void rest_lane(Lanes3* to, const Lanes3* from, int l)
+static inline void rest_lane(Block* block, const float rotation[9], int l)
 {
-    to->x[l] = from->x[l];
-    to->y[l] = from->y[l];
-    to->z[l] = from->z[l];
+    for (int n = 0; n < block->nodes; ++n) {
+        Real3 rest = roots_turn(rotation, lane_load(&block->rest[n], l));
+        lane_store(&block->position[n], l, rest);
+        lane_store(&block->previous[n], l, rest);
+        block->angle[n].theta[l] = block->angle[n].phi[l] = 0;
+        block->rate[n].theta[l] = block->rate[n].phi[l] = 0;
+    }
 }
 
-// At the end of a tick. The sum over a strand's nodes asks for all of them at once. The positions
-// of a substep ago need no look: what is wrong with them is wrong with these by now.
-static void quarantine_lost(Block* block)
+// At the end of a tick, under the head's rotation then. The sum over a strand's nodes asks for all
+// of them at once. The positions of a substep ago need no look: what is wrong with them is wrong
+// with these by now.
+static void quarantine_lost(Block* block, const float rotation[9])
 {
     real squares[LANES] = {0};
     for (int n = 0; n < block->nodes; ++n)
         quarantine_measure(&block->position[n], squares);
     for (int l = 0; l < LANES; ++l) {
         if (squares[l] <= LOST_M * LOST_M || !is_lost(block, l)) continue;
-        for (int n = 0; n < block->nodes; ++n) {
-            rest_lane(&block->position[n], &block->reference[n], l);
-            rest_lane(&block->previous[n], &block->reference[n], l);
-            block->angle[n].theta[l] = block->angle[n].phi[l] = 0;
-            block->rate[n].theta[l] = block->rate[n].phi[l] = 0;
-        }
+        rest_lane(block, rotation, l);
         block->quarantined += l < block->strands; // lanes beyond repeat the last strand
     }
 }

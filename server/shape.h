@@ -6,7 +6,7 @@
 // Moves every node towards its reference; a node of weight 0 sits on it exactly.
 static void shape_blend(Block* block)
 {
-    for (int n = 0; n < block->nodes; ++n) {
+    for (int n = 0; n < block->skinned; ++n) {
         Lanes3* p = &block->position[n];
         const Lanes3* reference = &block->reference[n];
         const real* keep = block->keep[n].v;

@@ -171,7 +171,7 @@ static size_t clearances(const SimDefinition* d)
 static size_t block_bytes(const SimDefinition* d)
 {
     return (size_t)d->nodes *
-               (14 * sizeof(Lanes3) + 3 * sizeof(Angles) + (11 + clearances(d)) * sizeof(Lanes)) +
+               (14 * sizeof(Lanes3) + 3 * sizeof(Angles) + (13 + clearances(d)) * sizeof(Lanes)) +
            sizeof(Lanes3);
 }
 
@@ -186,8 +186,9 @@ static void cut_block(Block* block, const SimDefinition* d, char* arena)
     for (size_t i = 0; i < sizeof vectors / sizeof vectors[0]; ++i)
         *vectors[i] = cut(&arena, nodes, sizeof(Lanes3));
     block->moment = cut(&arena, nodes + 1, sizeof(Lanes3));
-    Lanes** numbers[] = {&block->length, &block->keep,       &block->stiffness, &block->hinge,
-                         &block->mass,   &block->outer_part, &block->inner_part};
+    Lanes** numbers[] = {&block->length,    &block->per_length, &block->keep,
+                         &block->stiffness, &block->hinge,      &block->mass,
+                         &block->per_mass,  &block->outer_part, &block->inner_part};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i)
         *numbers[i] = cut(&arena, nodes, sizeof(Lanes));
     block->clearance = cut(&arena, nodes * clearances(d), sizeof(Lanes));
@@ -304,8 +305,11 @@ static void fill_node(Block* block, const SimDefinition* d, int strand, int lane
     block->keep[n].v[lane] = (real)keep_of(d, weight_of(d, strand, n));
     block->mass[n].v[lane] = (real)mass_of(d, n);
     block->inverse_mass[n].v[lane] = (real)inverse_mass(d, strand, n);
+    block->per_mass[n].v[lane] = 1 / block->mass[n].v[lane];
     if (n == 0) return;
-    block->length[n].v[lane] = (real)vec3_length(link_of(rest, n));
+    real length = (real)vec3_length(link_of(rest, n));
+    block->length[n].v[lane] = length;
+    block->per_length[n].v[lane] = 1 / (length > LEAST_LENGTH_M ? length : LEAST_LENGTH_M);
     fill_shares(block, d, strand, lane, n);
 }
 
@@ -371,6 +375,8 @@ static void fill_block(Block* block, const SimDefinition* d, int first)
         fill_tuned(block, d, d->rest + (size_t)strand * (size_t)d->nodes, lane);
         fill_frames(block, d, strand, lane);
         printed_fill(block, d, strand, lane);
+        for (int n = 0; n < d->nodes; ++n)
+            if (weight_of(d, strand, n) < 1.0f && block->skinned <= n) block->skinned = n + 1;
     }
 }
 
@@ -495,7 +501,7 @@ static void place(Block* block, const float rotation[9])
 {
     for (int n = 0; n < block->nodes; ++n)
         for (int l = 0; l < LANES; ++l)
-            lane_set(&block->reference[n], l, rotate(rotation, lane_get(&block->rest[n], l)));
+            lane_set(&block->position[n], l, rotate(rotation, lane_get(&block->rest[n], l)));
 }
 
 void sim_reset(Sim* sim, const float rotation[9])
@@ -508,8 +514,7 @@ void sim_reset(Sim* sim, const float rotation[9])
         Block* block = &sim->blocks[b];
         place(block, rotation);
         size_t bytes = (size_t)block->nodes * sizeof(Lanes3);
-        memcpy(block->position, block->reference, bytes);
-        memcpy(block->previous, block->reference, bytes);
+        memcpy(block->previous, block->position, bytes);
         memset(block->angle, 0, (size_t)block->nodes * sizeof(Angles));
         memset(block->rate, 0, (size_t)block->nodes * sizeof(Angles));
     }

@@ -12,6 +12,7 @@
 
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 #define LANES 32
 
@@ -19,12 +20,14 @@
 // model's own error shows, without that of float.
 #ifdef SIM_DOUBLE
 typedef double real;
+typedef int64_t real_bits;
 #define real_sqrt  sqrt
 #define real_abs   fabs
 #define RESOLVED_M 1e-15
 #define SETTLED    1e-30
 #else
 typedef float real;
+typedef int32_t real_bits;
 #define real_sqrt  sqrtf
 #define real_abs   fabsf
 // What positions within a metre resolve of a length.
@@ -42,6 +45,11 @@ typedef struct Lanes3 {
     real x[LANES], y[LANES], z[LANES];
 } Lanes3;
 
+// A vector of one lane, for what is worked out in one loop over lanes.
+typedef struct Real3 {
+    real x, y, z;
+} Real3;
+
 // Of a joint: theta about the z axis of the link before, phi about the link's own y axis.
 typedef struct Angles {
     real theta[LANES], phi[LANES];
@@ -52,6 +60,7 @@ typedef struct Angles {
 struct Block {
     int nodes;
     int strands;         // lanes beyond them repeat the last
+    int skinned;         // nodes before it are skinned, in part and in some lane; the rest is free
     int64_t quarantined; // times that a strand was put back (quarantine.h)
     // State: world axes, relative to the head's position, m.
     Lanes3* position;
@@ -59,7 +68,7 @@ struct Block {
     Angles* angle;    // forest-z: of joint n from rest, and how fast it turns, 1/s
     Angles* rate;
     // Within a substep.
-    Lanes3* reference;    // where rest is now
+    Lanes3* reference;    // where rest is now; of the nodes before `skinned`
     Lanes3* acceleration; // m/s^2; of a link's direction, 1/s^2, in the forest models
     Lanes3* direction;    // of link n, unit
     Lanes3* predicted;    // where link n would point if its joint were at rest, unit
@@ -67,16 +76,18 @@ struct Block {
     Lanes* tension;       // ... and how much is pulled along link n, m
     Lanes3* moment;       // of joint n on link n, m^2/s^2; one more, past the tip, is zero
     // Constants.
-    Lanes3* rest;     // head space, m
-    Lanes3* along;    // rest direction of link n in the frame of link n - 1
-    Lanes3* across;   // its frame's second axis, in the same frame (frames.h)
-    Lanes3* carried;  // what joint n holds of the weight outboard at rest, in that frame, m^2/s^2
-    Lanes* length;    // m
-    Lanes* keep;      // what one substep leaves of the distance to the reference: 0 skinned
-    Lanes* stiffness; // k/m, 1/s^2
-    Lanes* hinge;     // k/m times the square of the length between the middles of links, m^2/s^2
-    Lanes* mass;      // of the node, in masses of an inner node
-    Lanes* inverse_mass;      // 0 of a skinned node
+    Lanes3* rest;      // head space, m
+    Lanes3* along;     // rest direction of link n in the frame of link n - 1
+    Lanes3* across;    // its frame's second axis, in the same frame (frames.h)
+    Lanes3* carried;   // what joint n holds of the weight outboard at rest, in that frame, m^2/s^2
+    Lanes* length;     // m
+    Lanes* per_length; // 1/m, of no less than LEAST_LENGTH_M
+    Lanes* keep;       // what one substep leaves of the distance to the reference: 0 skinned
+    Lanes* stiffness;  // k/m, 1/s^2
+    Lanes* hinge;      // k/m times the square of the length between the middles of links, m^2/s^2
+    Lanes* mass;       // of the node, in masses of an inner node
+    Lanes* per_mass;   // its inverse
+    Lanes* inverse_mass;      // that, but 0 of a skinned node
     Lanes* outer_part;        // of a link's error corrected at node n
     Lanes* inner_part;        // ... and at node n - 1
     Lanes* clearance;         // [collider][node]: least distance to the axis, m
@@ -134,6 +145,61 @@ struct Sim {
     Tie* ties;
     void* memory; // of all blocks
 };
+
+// Functions of one lane, and the loops that are given one: a call would end the vector.
+#define INLINE static inline __attribute__((always_inline))
+
+// `v` where it is above `low`, which is not negative; else `low`. Positive numbers are in the order
+// of their bits, and the whole numbers' maximum is 2 cycles where compare and choose are 9
+// (AVX-512), in the middle of what everything waits for: root, this, division. NaN stays or is
+// `low`.
+INLINE real real_at_least(real v, real low)
+{
+    real_bits bits, least;
+    memcpy(&bits, &v, sizeof bits);
+    memcpy(&least, &low, sizeof least);
+    bits = bits > least ? bits : least;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+INLINE Real3 lane_load(const Lanes3* lanes, int lane)
+{
+    return (Real3){lanes->x[lane], lanes->y[lane], lanes->z[lane]};
+}
+
+INLINE void lane_store(Lanes3* lanes, int lane, Real3 v)
+{
+    lanes->x[lane] = v.x;
+    lanes->y[lane] = v.y;
+    lanes->z[lane] = v.z;
+}
+
+INLINE Real3 real3_sub(Real3 a, Real3 b)
+{
+    return (Real3){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+// a + s b
+INLINE Real3 real3_mad(Real3 a, Real3 b, real s)
+{
+    return (Real3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
+}
+
+INLINE Real3 real3_scale(Real3 v, real s)
+{
+    return (Real3){v.x * s, v.y * s, v.z * s};
+}
+
+INLINE real real3_dot(Real3 a, Real3 b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+INLINE Real3 real3_cross(Real3 a, Real3 b)
+{
+    return (Real3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 
 static inline Vec3 rotate(const float m[9], Vec3 v)
 {
