@@ -77,8 +77,8 @@ static inline void frames_next(Block* block, int n, Lanes3* second)
     }
 }
 
-// Fills direction, predicted and moment of every link; of the moment what carries the weight at
-// rest.
+// Fills direction, predicted and moment of every link; of the moment the vector c whose d x c
+// carries the weight at rest (sim.c).
 static void frames_follow(Block* block, const Substep* substep)
 {
     Lanes3 second;

@@ -17,9 +17,9 @@ typedef struct CascadeOutboard {
     Lanes3 moment, force;
 } CascadeOutboard;
 
-// On link n act the moment of joint n, K (d x a) and what carries the weight at rest, and against
-// it that of joint n + 1: together a couple of forces, moment x d / length at the outer end and the
-// opposite at the inner one. Node n has one end of link n and one of link n + 1.
+// On link n act the moment of joint n, K (d x a) and the d x c that carries the weight at rest, and
+// against it that of joint n + 1: together a couple of forces, moment x d / length at the outer end
+// and the opposite at the inner one. Node n has one end of link n and one of link n + 1.
 static inline void cascade_link(Block* block, int n, real gravity, CascadeOutboard* outboard)
 {
     const Lanes3 *direction = &block->direction[n], *predicted = &block->predicted[n];
@@ -30,7 +30,7 @@ static inline void cascade_link(Block* block, int n, real gravity, CascadeOutboa
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
         Real3 d = lane_load(direction, l), a = lane_load(predicted, l);
-        Real3 moment = real3_mad(lane_load(carried, l), real3_cross(d, a), hinge[l]);
+        Real3 moment = real3_cross(d, real3_mad(lane_load(carried, l), a, hinge[l]));
         Real3 turning = real3_sub(moment, lane_load(&outboard->moment, l));
         Real3 force = real3_scale(real3_cross(turning, d), per_length[l]);
         Real3 sum = real3_sub(force, lane_load(&outboard->force, l));

@@ -37,8 +37,9 @@ static inline real forest_arc(real c)
     return 2 * (even + odd * s) * inverse;
 }
 
-// Adds K phi about d x a to the moment of joint n. A loop of its own: with the next one it would be
-// too long for the processor to begin the next lanes while it waits for this root and division.
+// To the moment of joint n, K phi about d x a and what carries the weight at rest, from what
+// frames.h left there. A loop of its own: with the next one it would be too long for the processor
+// to begin the next lanes while it waits for this root and division.
 static inline void forest_joint(Block* block, int n)
 {
     const Lanes3 *direction = &block->direction[n], *predicted = &block->predicted[n];
@@ -48,7 +49,7 @@ static inline void forest_joint(Block* block, int n)
     for (int l = 0; l < LANES; ++l) {
         Real3 d = lane_load(direction, l), a = lane_load(predicted, l);
         real k = hinge[l] * forest_arc(real3_dot(a, d));
-        lane_store(moment, l, real3_mad(lane_load(moment, l), real3_cross(d, a), k));
+        lane_store(moment, l, real3_cross(d, real3_mad(lane_load(moment, l), a, k)));
     }
 }
 

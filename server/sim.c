@@ -285,7 +285,10 @@ static void fill_hinge(Block* block, const SimDefinition* d, const Vec3* rest, i
     double length = (double)vec3_length(link_of(rest, n));
     if (n > 1) length = 0.5 * (length + (double)vec3_length(link_of(rest, n - 1)));
     double clamp = n == 1 && d->model != MODEL_FOREST_Z ? 2.0 : 1.0;
-    block->hinge[n].v[lane] = (real)(clamp * k * length * length);
+    double hinge = clamp * k * length * length;
+    double chi = getenv("CHI") ? atof(getenv("CHI")) : 1e9;
+    double need = (double)vec3_length(lane_get(&block->carried[n], lane)) / chi;
+    block->hinge[n].v[lane] = (real)(hinge > need ? hinge : need);
 }
 
 // What sim_tune may change.
@@ -325,10 +328,14 @@ static Vec3 across(Vec3 d)
     return vec3_normalise_or(vec3_mad(axis, d, -vec3_dot(axis, d)), vec3(0, 0, 1));
 }
 
-// The moments in the joints that carry the weight of the strand at rest: from T[n] - T[n+1] +
-// length d x F[n] = 0 on each link, F the weight outboard, tip first. They are fixed in the frames,
-// like a bend in the strand: in its rest pose it does not sag, tilted it hangs another way. Too
-// soft a strand that stands up falls over all the same.
+// What the joints need to carry the weight of the strand at rest. From the tip in, link n is in
+// balance where across it T[n] - T[n+1] + length d x F[n] = 0, F the weight outboard; T[n] across
+// link n, because frames do not twist. A moment fixed in the frames would do, and would feed energy
+// into a strand whose head spins: it is no gradient. d x c with c = T x d is that of the potential
+// -c.d, a pull on the link's end that stays in the frame, and is T[n] at rest.
+//
+// In its rest pose a strand does not sag; tilted it hangs another way. Too soft a strand that
+// stands up falls over all the same.
 static void fill_carried(Vec3* carried, const SimDefinition* d, const Vec3* rest)
 {
     Vec3 moment = vec3(0, 0, 0), load = vec3(0, 0, 0);
@@ -336,7 +343,9 @@ static void fill_carried(Vec3* carried, const SimDefinition* d, const Vec3* rest
     for (int n = d->nodes - 1; n >= 1; --n) {
         load.y -= is_carried ? d->gravity_m_s2 * (float)mass_of(d, n) : 0.0f;
         moment = vec3_sub(moment, vec3_cross(link_of(rest, n), load));
-        carried[n] = moment;
+        Vec3 way = vec3_normalise_or(link_of(rest, n), vec3(0, -1, 0));
+        moment = vec3_mad(moment, way, -vec3_dot(moment, way));
+        carried[n] = vec3_cross(moment, way);
     }
 }
 
@@ -372,8 +381,8 @@ static void fill_block(Block* block, const SimDefinition* d, int first)
         int strand = first + lane < d->strands ? first + lane : d->strands - 1;
         for (int n = 0; n < d->nodes; ++n)
             fill_node(block, d, strand, lane, n);
-        fill_tuned(block, d, d->rest + (size_t)strand * (size_t)d->nodes, lane);
         fill_frames(block, d, strand, lane);
+        fill_tuned(block, d, d->rest + (size_t)strand * (size_t)d->nodes, lane);
         printed_fill(block, d, strand, lane);
         for (int n = 0; n < d->nodes; ++n)
             if (weight_of(d, strand, n) < 1.0f && block->skinned <= n) block->skinned = n + 1;

@@ -76,21 +76,21 @@ struct Block {
     Lanes* tension;       // ... and how much is pulled along link n, m
     Lanes3* moment;       // of joint n on link n, m^2/s^2; one more, past the tip, is zero
     // Constants.
-    Lanes3* rest;      // head space, m
-    Lanes3* along;     // rest direction of link n in the frame of link n - 1
-    Lanes3* across;    // its frame's second axis, in the same frame (frames.h)
-    Lanes3* carried;   // what joint n holds of the weight outboard at rest, in that frame, m^2/s^2
-    Lanes* length;     // m
-    Lanes* per_length; // 1/m, of no less than LEAST_LENGTH_M
-    Lanes* keep;       // what one substep leaves of the distance to the reference: 0 skinned
-    Lanes* stiffness;  // k/m, 1/s^2
-    Lanes* hinge;      // k/m times the square of the length between the middles of links, m^2/s^2
-    Lanes* mass;       // of the node, in masses of an inner node
-    Lanes* per_mass;   // its inverse
-    Lanes* inverse_mass;      // that, but 0 of a skinned node
-    Lanes* outer_part;        // of a link's error corrected at node n
-    Lanes* inner_part;        // ... and at node n - 1
-    Lanes* clearance;         // [collider][node]: least distance to the axis, m
+    Lanes3* rest;        // head space, m
+    Lanes3* along;       // rest direction of link n in the frame of link n - 1
+    Lanes3* across;      // its frame's second axis, in the same frame (frames.h)
+    Lanes3* carried;     // c of joint n, in that frame, m^2/s^2: d x c carries the weight at rest
+    Lanes* length;       // m
+    Lanes* per_length;   // 1/m, of no less than LEAST_LENGTH_M
+    Lanes* keep;         // what one substep leaves of the distance to the reference: 0 skinned
+    Lanes* stiffness;    // k/m, 1/s^2
+    Lanes* hinge;        // k/m times the square of the length between the middles of links, m^2/s^2
+    Lanes* mass;         // of the node, in masses of an inner node
+    Lanes* per_mass;     // its inverse
+    Lanes* inverse_mass; // that, but 0 of a skinned node
+    Lanes* outer_part;   // of a link's error corrected at node n
+    Lanes* inner_part;   // ... and at node n - 1
+    Lanes* clearance;    // [collider][node]: least distance to the axis, m
     Lanes* clearance_of_link; // ... of link n; COLLIDE_SEGMENT alone
     // Of the printed models alone; forest-z has its y and x axes in predicted and moment.
     Lanes3* upward;     // cascade-thesis: node n at rest in the space of link n - 1, m (printed.c)
