@@ -57,7 +57,7 @@ typedef struct SimDefinition {
     float tip_mass; // of the last node, in masses of the others: 1, or a half
     // forest, forest-z: the head's acceleration acts on the tips alone, not on every link. A link
     // has no inertia but its own, so the load of all links outboard overdrives it: against the rod
-    // tips alone are twice as near in jump-stop and three times in run, and 8 % farther in nod
+    // tips alone are twice as near in jump-stop, almost thrice in run, and 9 to 18 % farther in nod
     // (tests/charts/accuracy.csv).
     bool outermost;
     bool force;  // take what is beyond the stability bound
