@@ -39,6 +39,7 @@ SimDefinition sim_default(void)
                            .pearl_radius_m = 0.006f,
                            .gravity_compensation = true,
                            .tip_mass = 1.0f,
+                           .outermost = true,
                            .threads = 1};
 }
 

@@ -325,6 +325,7 @@ static const Case cases[] = {
 
 static const Study studies[] = {
     {"sim", "what a tick costs, by model, kernel, strands, nodes, iterations, threads", study_sim},
+    {"accuracy", "errors against two truths over the clips, with the cost of each", study_accuracy},
     {"stability", "where the models fail: boundaries measured and derived, eleven maps",
      study_stability},
 };

@@ -24,6 +24,8 @@ struct Rod {
     Past *last, *before; // [nodes], at the end of the last step and of the one before
     Past head_last, head_before;
     Quat head_turn;
+    Vec3d wind_m_s;
+    double drag_per_s;
     Vec3d* goal;       // [nodes], where the nodes would be at the end of the step without forces
     double inertia_s2; // how strongly the goal holds: mass x inertia is a stiffness; 0: statics
     double *gradient, *change, *matrix, *factor;
@@ -439,14 +441,16 @@ static Past mean_past(Past last, Past before, bool euler)
     };
 }
 
-// m (a + damping v) = force, with v = rate (u - mean) and a = rate (v - mean v) + a of the head, is
-//     m (rate^2 + damping rate) (u - goal) = force.
-static void set_goals(Rod* rod, double rate, Vec3d head_acceleration, bool euler)
+// m (a + damping v + drag (v + v of the head - wind)) = force, with v = rate (u - mean) and
+// a = rate (v - mean v) + a of the head, is
+//     m (rate^2 + (damping + drag) rate) (u - goal) = force.
+// `push` is what the head's acceleration and the air's move past it add to every node.
+static void set_goals(Rod* rod, double rate, Vec3d push, bool euler)
 {
-    rod->inertia_s2 = rate * rate + rod->definition.damping_per_s * rate;
+    rod->inertia_s2 = rate * rate + (rod->definition.damping_per_s + rod->drag_per_s) * rate;
     for (int j = 0; j < rod->definition.nodes; ++j) {
         Past mean = mean_past(rod->last[j], rod->before[j], euler);
-        Vec3d pull = vec3d_mad(vec3d_scale(mean.velocity, rate), head_acceleration, -1.0);
+        Vec3d pull = vec3d_mad(push, mean.velocity, rate);
         rod->goal[j] = vec3d_mad(mean.position, pull, 1.0 / rod->inertia_s2);
     }
 }
@@ -479,7 +483,8 @@ bool rod_step(Rod* rod, Pose head)
     rod->head_before = rod->head_last, rod->head_last = at;
     rod->head_turn = head.orientation;
 
-    set_goals(rod, rate, acceleration, euler);
+    Vec3d air = vec3d_sub(rod->wind_m_s, at.velocity);
+    set_goals(rod, rate, vec3d_mad(vec3d_scale(air, rod->drag_per_s), acceleration, -1.0), euler);
     guess(rod, head.orientation);
     bool found = minimise(rod);
     for (int j = 0; j < rod->definition.nodes; ++j) {
@@ -495,6 +500,12 @@ static void past_turn(Past* past, Quat turn)
 {
     past->position = quat_rotate(turn, past->position);
     past->velocity = quat_rotate(turn, past->velocity);
+}
+
+void rod_blow(Rod* rod, Vec3d wind_m_s, double drag_per_s)
+{
+    rod->wind_m_s = wind_m_s;
+    rod->drag_per_s = drag_per_s;
 }
 
 void rod_carry(Rod* rod, Pose head)

@@ -64,6 +64,10 @@ void rod_place(Rod* rod, const Vec3d* positions);
 // did not get there (the state is then its last guess).
 bool rod_step(Rod* rod, Pose head);
 
+// From the next step on the air moves at `wind_m_s` and draws every node towards its own velocity:
+// a = drag (wind - velocity), both in the world. rod_settle() does not know of it.
+void rod_blow(Rod* rod, Vec3d wind_m_s, double drag_per_s);
+
 // The head jumps to `head` between two steps and takes the rod along, with the velocities that it
 // has relative to the head; the head's own velocity stays as it is.
 void rod_carry(Rod* rod, Pose head);

@@ -48,6 +48,7 @@ static inline SimDefinition bare(ModelKind model, int links)
     d.fall_off_power = 0;
     d.damping_per_s = 0;
     d.iterations = 1;
+    d.outermost = false; // the head's acceleration is then a force on all, as gravity is
     return d;
 }
 

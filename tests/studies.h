@@ -12,6 +12,7 @@ typedef struct Study {
 } Study;
 
 bool study_sim(Fault* fault);
+bool study_accuracy(Fault* fault);
 bool study_stability(Fault* fault);
 
 // "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.

@@ -296,6 +296,33 @@ static void spring_is_critically_damped_where_it_should(void** state)
 }
 #endif
 
+// A push of the head turns every link by h / d where it acts on the tip alone, and by as many times
+// that as there are links from it to the tip where it acts on all.
+static void the_head_pushes_the_forests_tips(void** state)
+{
+    (void)state;
+    const double push = 1e-5;
+    for (int on_all = 0; on_all < 2; ++on_all) {
+        SimDefinition d = bare(MODEL_FOREST, 7);
+        Strand strand;
+        straight(&strand, 7, vec3(0, -1, 0));
+        d.substeps = 1;
+        d.gravity_m_s2 = 0;
+        d.stiffness_s2 = 0;
+        d.outermost = on_all ? false : sim_default().outermost;
+        start(&strand, d);
+        SimHead head = {.second_difference = vec3((float)-push, 0, 0)};
+        memcpy(head.rotation, identity, sizeof identity);
+        sim_step(strand.sim, &head);
+        double way = 0.0;
+        for (int n = 1; n <= 7; ++n) {
+            way += push * (on_all ? 8 - n : 1);
+            assert_near(node(&strand, n).x, way, 1e-3 * way);
+        }
+        sim_destroy(strand.sim);
+    }
+}
+
 // Stability -------------------------------------------------------------------------------------
 
 // Does a push of a thousandth of its length grow?
@@ -429,6 +456,7 @@ int main(void)
         cmocka_unit_test(one_sweep_leaves_the_stretch_of_the_closed_form),
         cmocka_unit_test(plain_swings_in_the_heavy_chains_modes),
         cmocka_unit_test(plain_forest_and_cascade_of_one_link_are_the_pendulum),
+        cmocka_unit_test(the_head_pushes_the_forests_tips),
         cmocka_unit_test(each_model_breaks_where_its_eigenvalues_say),
         cmocka_unit_test(the_bound_that_is_refused_is_on_the_safe_side_and_near),
 #ifdef SIM_DOUBLE

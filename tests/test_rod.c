@@ -488,6 +488,63 @@ static void rod_feels_acceleration_as_weight(void** state)
     assert_true(farthest(weighs, pushed, NODES) < 1e-4); // Euler's first step sees half of it
 }
 
+// After some seconds in a wind from above, without gravity; or in gravity, at once.
+static void blown(bool wind, Vec3d* nodes, int count)
+{
+    RodDefinition d = curl(nodes, count);
+    double g = d.gravity_m_s2;
+    if (wind) d.gravity_m_s2 = 0.0;
+    d.dt_s = 1e-2;
+    Rod* rod = create(d);
+    assert_true(rod_settle(rod, pose_identity(), still));
+    if (wind) rod_blow(rod, (Vec3d){0, -0.5 * g, 0}, 2.0);
+    for (int step = 0; step < 1500; ++step)
+        assert_true(rod_step(rod, pose_identity()));
+    rod_positions(rod, nodes);
+    rod_destroy(rod);
+}
+
+static void rod_leans_in_the_wind_as_under_a_weight(void** state)
+{
+    (void)state;
+    enum { NODES = 16 };
+    Vec3d weighs[NODES], leans[NODES], rest[NODES];
+    blown(false, weighs, NODES);
+    blown(true, leans, NODES);
+    curl(rest, NODES);
+    assert_true(farthest(weighs, rest, NODES) > 0.02);
+    assert_true(farthest(weighs, leans, NODES) < 1e-5);
+}
+
+// Under a head that goes with the wind, drag is damping of that size.
+static void rod_feels_the_wind_past_its_head(void** state)
+{
+    (void)state;
+    enum { NODES = 12 };
+    Vec3d nodes[3][NODES];
+    const Vec3d speed = {0, 0, 3};
+    for (int i = 0; i < 3; ++i) {
+        RodDefinition d = curl(nodes[i], NODES);
+        if (i == 2) d.damping_per_s = 2.0;
+        Rod* rod = create(d);
+        assert_true(rod_settle(rod, pose_identity(), speed));
+        rod_positions(rod, nodes[i]);
+        for (int j = 1; j < NODES; ++j)
+            nodes[i][j].x += 0.002 * j; // let go from beside its rest
+        rod_place(rod, nodes[i]);
+        if (i > 0) rod_blow(rod, i == 1 ? speed : (Vec3d){0, 0, 0}, i == 1 ? 2.0 : 0.0);
+        Pose head = pose_identity();
+        for (int step = 0; step < 200; ++step) {
+            head.position = vec3d_add(head.position, vec3d_scale(speed, d.dt_s));
+            assert_true(rod_step(rod, head));
+        }
+        rod_positions(rod, nodes[i]);
+        rod_destroy(rod);
+    }
+    assert_true(farthest(nodes[0], nodes[1], NODES) > 1e-3); // drag damps
+    assert_true(farthest(nodes[1], nodes[2], NODES) < 1e-9); // as damping of that size does
+}
+
 // Nods and goes forward and back in 0.4 s, the pivot 0.15 m below the head.
 static Pose nod(double t)
 {
@@ -591,6 +648,8 @@ int main(void)
         cmocka_unit_test(rod_does_not_feel_constant_speed),
         cmocka_unit_test(rod_is_carried_over_a_jump),
         cmocka_unit_test(rod_feels_acceleration_as_weight),
+        cmocka_unit_test(rod_leans_in_the_wind_as_under_a_weight),
+        cmocka_unit_test(rod_feels_the_wind_past_its_head),
         cmocka_unit_test(rod_follows_a_head_at_the_order_of_its_scheme),
         cmocka_unit_test(rod_settles_in_a_few_newton_iterations),
         cmocka_unit_test(rod_refuses_what_it_cannot_be),
