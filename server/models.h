@@ -6,6 +6,8 @@
 typedef struct Model {
     const char* name; // as --model
     const char* help;
+    float stiffness_s2; // as it is by default, and how it falls to the tip
+    int fall_off_power;
     bool has_shape;     // rest is equilibrium once gravity is compensated
     bool has_hinges;    // stiffness is of joints, and the clamped root's counts double
     bool drops_gravity; // for compensation
@@ -20,6 +22,9 @@ extern const Model models[MODEL_COUNT];
 
 // MODEL_COUNT where there is none of that name.
 ModelKind model_find(const char* name);
+
+// Makes `definition` one of `model`, as stiff as that is by default.
+void model_use(SimDefinition* definition, ModelKind model);
 
 // The largest stable stiffness_s2 for the rate, substeps, damping and drag of `definition`.
 double model_stiffness_bound(const SimDefinition* definition);

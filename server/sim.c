@@ -18,25 +18,23 @@
 #define SIM_MAX_SUBSTEPS   1024
 #define SIM_MAX_ITERATIONS 4096
 
-// 1600 1/s^2 falling with the square of 25 L leaves 33 at the tip of a strand of 28 cm, about what
-// gravity gives a pendulum of that length, and 16 at 40 cm.
 SimDefinition sim_default(void)
 {
-    return (SimDefinition){.rate_hz = 60.0,
-                           .substeps = 4,
-                           .iterations = 1,
-                           .gravity_m_s2 = 9.81f,
-                           .stiffness_s2 = 1600.0f,
-                           .fall_off_per_m = 25.0f,
-                           .fall_off_power = 2,
-                           .damping_per_s = 8.0f,
-                           .drag_per_s = 1.0f,
-                           .joint_damping_per_s = 60.0f,
-                           .down_share = 0.05f,
-                           .pearl_radius_m = 0.006f,
-                           .gravity_compensation = true,
-                           .tip_mass = 1.0f,
-                           .threads = 1};
+    SimDefinition definition = {.rate_hz = 60.0,
+                                .substeps = 4,
+                                .iterations = 1,
+                                .gravity_m_s2 = 9.81f,
+                                .fall_off_per_m = 25.0f,
+                                .damping_per_s = 8.0f,
+                                .drag_per_s = 1.0f,
+                                .joint_damping_per_s = 60.0f,
+                                .down_share = 0.05f,
+                                .pearl_radius_m = 0.006f,
+                                .gravity_compensation = true,
+                                .tip_mass = 1.0f,
+                                .threads = 1};
+    model_use(&definition, MODEL_SPRING);
+    return definition;
 }
 
 static bool in_range(double value, double low, double high, const char* name, Fault* fault)
