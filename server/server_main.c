@@ -57,6 +57,8 @@ enum {
     KEY_STIFFNESS,
     KEY_DAMPING,
     KEY_DRAG,
+    KEY_JOINT_DAMPING,
+    KEY_DOWN_SHARE,
     KEY_GRAVITY,
     KEY_THREADS,
     KEY_PROJECT,
@@ -104,9 +106,13 @@ static const struct argp_option option_table[] = {
     {"damping", KEY_DAMPING, "S", 0, "Decay of velocity relative to the head, 1/s (8)", 2},
     {"drag", KEY_DRAG, "S", 0, "Decay of velocity relative to the air where a wind blows, 1/s (1)",
      2},
+    {"joint-damping", KEY_JOINT_DAMPING, "S", 0, "v/J of a joint of forest-z, 1/s (60)", 2},
+    {"down-share", KEY_DOWN_SHARE, "SHARE", 0,
+     "The downward springs' part of k in cascade-thesis, 0 to 1 (0.05)", 2},
     {"gravity", KEY_GRAVITY, "on|off", 0,
      "on: rest is where gravity pulls from; off (default): gravity is compensated at rest", 2},
-    {"force", KEY_FORCE, NULL, 0, "Take a stiffness beyond the bound of stability", 2},
+    {"force", KEY_FORCE, NULL, 0, "Take a stiffness or joint damping beyond its bound of stability",
+     2},
     {"kernel", KEY_KERNEL, "NAME", 0,
      "avx512, avx2, sse2 or scalar (default: the widest here); the result does not depend on it",
      2},
@@ -266,6 +272,12 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
         break;
     case KEY_DRAG:
         sim->drag_per_s = (float)number(state, "drag", text, 0, 1e4);
+        break;
+    case KEY_JOINT_DAMPING:
+        sim->joint_damping_per_s = (float)number(state, "joint-damping", text, 0, 1e6);
+        break;
+    case KEY_DOWN_SHARE:
+        sim->down_share = (float)number(state, "down-share", text, 0, 1);
         break;
     case KEY_GRAVITY:
         sim->gravity_compensation = !on_off(state, "gravity", text);
