@@ -3,6 +3,7 @@
 #include "server/daemon_characters.h"
 #include "server/daemon_inputs.h"
 #include "server/daemon_state.h"
+#include "server/models.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -41,11 +42,14 @@ static bool check_parts(const StyleBytes* bytes, int mtu, Fault* fault)
 }
 
 // Now, not when the first character comes: by then nobody is looking.
-static bool check_simulation(const Daemon* daemon, const Hairstyle* hair, Fault* fault)
+static bool check_simulation(Daemon* daemon, const Hairstyle* hair, Fault* fault)
 {
     SimDefinition definition = character_definition(&daemon->sim, hair);
     Sim* trial = sim_create(&definition, fault);
     sim_destroy(trial);
+    Fault forced;
+    if (trial != NULL && !model_is_stable(&definition, &forced))
+        complaints_warn(&daemon->complaints, COMPLAINT_FORCED, forced.text);
     return trial != NULL;
 }
 

@@ -78,6 +78,24 @@ double model_joint_damping_bound(const SimDefinition* d)
     return models[d->model].has_angles ? 0.5 * d->rate_hz * d->substeps : 1e30;
 }
 
+static bool is_within(const SimDefinition* d, const char* field, double value, double bound,
+                      Fault* fault)
+{
+    return value <= bound ||
+           fault_set(
+               fault, "simulation: %s is %g; %s at %g Hz and %d substeps is stable to %.0f: %s",
+               field, value, models[d->model].name, d->rate_hz, d->substeps, bound,
+               d->force ? "forced: strands will shake, and those that are lost go back to rest"
+                        : "lower it, raise either, or --force it");
+}
+
+bool model_is_stable(const SimDefinition* d, Fault* fault)
+{
+    return is_within(d, "stiffness_s2", (double)d->stiffness_s2, model_stiffness_bound(d), fault) &&
+           is_within(d, "joint_damping_per_s", (double)d->joint_damping_per_s,
+                     model_joint_damping_bound(d), fault);
+}
+
 float model_stiffness(const SimDefinition* definition, float from_root_m)
 {
     float reach = definition->fall_off_per_m * from_root_m;

@@ -33,6 +33,10 @@ double model_stiffness_bound(const SimDefinition* definition);
 // other models.
 double model_joint_damping_bound(const SimDefinition* definition);
 
+// False with a fault where a value is beyond its bound: what the bound is, and what to do; of a
+// `definition` that is forced, what will happen.
+bool model_is_stable(const SimDefinition* definition, Fault* fault);
+
 // k/m, 1/s^2, `from_root_m` along the strand at rest: k / max(1, c L)^a. Thesis 5.9 prints k / (L
 // c)^a, which is infinite at the root and exceeds k wherever L c < 1. By length, not by node
 // number: counted in nodes, a fringe of 4 cm is as limp as a plait.

@@ -56,30 +56,6 @@ static bool check_rest(const SimDefinition* d, Fault* fault)
     return true;
 }
 
-static bool check_stiffness(const SimDefinition* d, Fault* fault)
-{
-    double bound = model_stiffness_bound(d), k = (double)d->stiffness_s2;
-    if (!(k >= 0.0 && k <= 1e12))
-        return fault_set(fault, "simulation: stiffness_s2 is %g; it must be 0 to 1e12", k);
-    return k <= bound || d->force ||
-           fault_set(
-               fault,
-               "simulation: stiffness_s2 is %g; %s at %g Hz and %d substeps is stable to %.0f: "
-               "lower it, or raise either",
-               k, models[d->model].name, d->rate_hz, d->substeps, bound);
-}
-
-static bool check_joint_damping(const SimDefinition* d, Fault* fault)
-{
-    double bound = model_joint_damping_bound(d), v = (double)d->joint_damping_per_s;
-    if (!in_range(v, 0, 1e6, "joint_damping_per_s", fault)) return false;
-    return v <= bound || d->force ||
-           fault_set(fault,
-                     "simulation: joint_damping_per_s is %g; %s at %g Hz and %d substeps is stable "
-                     "to %.0f: lower it, or raise either",
-                     v, models[d->model].name, d->rate_hz, d->substeps, bound);
-}
-
 static bool check_model(const SimDefinition* d, Fault* fault)
 {
     if ((int)d->model < 0 || d->model >= MODEL_COUNT)
@@ -96,8 +72,10 @@ static bool check_tuned(const SimDefinition* d, Fault* fault)
            in_range((double)d->gravity_m_s2, -1000, 1000, "gravity_m_s2", fault) &&
            in_range((double)d->damping_per_s, 0, 1e4, "damping_per_s", fault) &&
            in_range((double)d->drag_per_s, 0, 1e4, "drag_per_s", fault) &&
-           check_stiffness(d, fault) &&
-           in_range((double)d->pearl_radius_m, 0, 1, "pearl_radius_m", fault);
+           in_range((double)d->stiffness_s2, 0, 1e12, "stiffness_s2", fault) &&
+           in_range((double)d->joint_damping_per_s, 0, 1e6, "joint_damping_per_s", fault) &&
+           in_range((double)d->pearl_radius_m, 0, 1, "pearl_radius_m", fault) &&
+           (d->force || model_is_stable(d, fault));
 }
 
 static bool check(const SimDefinition* d, Fault* fault)
@@ -107,7 +85,6 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range(d->collider_count, 0, HAIRSTYLE_MAX_COLLIDERS, "colliders", fault) &&
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
            in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) && check_tuned(d, fault) &&
-           check_joint_damping(d, fault) &&
            in_range((double)d->down_share, 0, 1, "down_share", fault) &&
            in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
