@@ -184,11 +184,18 @@ static void calm_down(Sim* sim, const float rotation[9])
         sim_step(sim, heads);
 }
 
+static bool is_same(const float a[9], const float b[9])
+{
+    int same = 0;
+    while (same < 9 && a[same] == b[same])
+        ++same;
+    return same == 9;
+}
+
 // The equilibrium that rest leads to under `rotation`.
 static const Vec3* equilibrium(Style* style, const SimDefinition* model, const float rotation[9])
 {
-    if (style->calm_model == (int)model->model &&
-        memcmp(style->calm_rotation, rotation, sizeof style->calm_rotation) == 0)
+    if (style->calm_model == (int)model->model && is_same(style->calm_rotation, rotation))
         return style->calm;
     SimDefinition d = character_definition(model, style->hair);
     Sim* sim = create(&d);
