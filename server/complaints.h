@@ -12,6 +12,7 @@ typedef enum Complaint {
     COMPLAINT_WIND,
     COMPLAINT_TUNING,
     COMPLAINT_UNSTABLE,
+    COMPLAINT_FORCED,
     COMPLAINT_REQUEST,
     COMPLAINT_STATUS,
     COMPLAINT_CHANNEL,
@@ -31,7 +32,9 @@ typedef struct Complaints {
     bool said[COMPLAINT_COUNT];
 } Complaints;
 
-// Of what is odd, but taken.
+// Of what was asked for in spite of a warning.
+void complaints_warn(Complaints* complaints, Complaint kind, const char* text);
+// Of what is odd, but taken; somebody counts it.
 void complaints_remark(Complaints* complaints, Complaint kind, const char* text);
 // Of what is refused.
 void complaints_reject(Complaints* complaints, Complaint kind, const char* text);

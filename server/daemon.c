@@ -3,6 +3,7 @@
 #include "server/daemon_characters.h"
 #include "server/daemon_inputs.h"
 #include "server/daemon_state.h"
+#include "server/models.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -41,9 +42,12 @@ static bool check_parts(const StyleBytes* bytes, int mtu, Fault* fault)
 }
 
 // Now, not when the first character comes: by then nobody is looking.
-static bool check_simulation(const Daemon* daemon, const Hairstyle* hair, Fault* fault)
+static bool check_simulation(Daemon* daemon, const Hairstyle* hair, Fault* fault)
 {
     Sim* trial = character_sim(&daemon->sim, hair, fault);
+    Fault forced;
+    if (trial != NULL && !model_is_stable(sim_definition(trial), &forced))
+        complaints_warn(&daemon->complaints, COMPLAINT_FORCED, forced.text);
     sim_destroy(trial);
     return trial != NULL;
 }

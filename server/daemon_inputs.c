@@ -1,6 +1,7 @@
 #include "server/daemon_inputs.h"
 
 #include "server/daemon_characters.h"
+#include "server/models.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -194,8 +195,9 @@ static void apply_wind(Daemon* daemon, const WindMessage* message)
     }
 }
 
-static bool tune(Character* c, const TuningMessage* message, Fault* fault)
+static bool tune(Daemon* daemon, Character* c, const TuningMessage* message, Fault* fault)
 {
+    Fault forced;
     SimDefinition wanted = *sim_definition(c->sim);
     if (message->set & TUNING_STIFFNESS) wanted.stiffness_s2 = message->stiffness_s2;
     if (message->set & TUNING_DAMPING) wanted.damping_per_s = message->damping_per_s;
@@ -203,7 +205,10 @@ static bool tune(Character* c, const TuningMessage* message, Fault* fault)
     if (message->set & TUNING_DRAG) wanted.drag_per_s = message->drag_per_s;
     if (message->set & TUNING_ITERATIONS) wanted.iterations = message->iterations;
     if (message->set & TUNING_PEARL_RADIUS) wanted.pearl_radius_m = message->pearl_radius_m;
-    return sim_tune(c->sim, &wanted, fault);
+    if (!sim_tune(c->sim, &wanted, fault)) return false;
+    if (!model_is_stable(sim_definition(c->sim), &forced))
+        complaints_warn(&daemon->complaints, COMPLAINT_FORCED, forced.text);
+    return true;
 }
 
 // Each character by itself: what one is stable with may be too much for another's damping.
@@ -214,7 +219,7 @@ static void apply_tuning(Daemon* daemon, const TuningMessage* message)
     for (int i = 0; i < daemon->used; ++i) {
         Character* c = daemon->characters[daemon->order[i]];
         if (is_among(c, message->first_slot, message->slot_count))
-            taken = tune(c, message, &fault) && taken;
+            taken = tune(daemon, c, message, &fault) && taken;
     }
     if (taken) return;
     fault_prefix(&fault, CHANNEL_TUNING);

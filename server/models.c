@@ -4,9 +4,18 @@
 
 #include <string.h>
 
+// Of springs to rest places, 1600 1/s^2 falling with the square of 25 L leaves 33 at the tip of a
+// strand of 28 cm, about what gravity gives a pendulum of that length, and 16 at 40 cm. A chain of
+// joints is a rod, the same all along: 12,000 is Gamma = 7 at 28 cm, and five sixths of what the
+// cascade is stable to at 240 steps a second. With the springs' values its tips buckled under their
+// own weight and came back another way each time (tests/test_clips.c).
+#define SPRINGS .stiffness_s2 = 1600.0f, .fall_off_power = 2
+#define JOINTS  .stiffness_s2 = 12000.0f, .fall_off_power = 0
+
 const Model models[MODEL_COUNT] = {
     [MODEL_SPRING] = {.name = "spring",
                       .help = "each node on a spring to its rest place (thesis 4.4)",
+                      SPRINGS,
                       .has_shape = true,
                       .drops_gravity = true,
                       .stiffest_mode = 1.0},
@@ -14,23 +23,27 @@ const Model models[MODEL_COUNT] = {
     // k.
     [MODEL_CASCADE] = {.name = "cascade",
                        .help = "springs in the joints push and push back (thesis 4.3, corrected)",
+                       JOINTS,
                        .has_shape = true,
                        .has_hinges = true,
                        .stiffest_mode = 16.0},
     [MODEL_FOREST] = {.name = "forest",
                       .help = "links turn in sprung joints (thesis 4.2, corrected)",
+                      JOINTS,
                       .has_shape = true,
                       .has_hinges = true,
                       .stiffest_mode = 4.0},
-    [MODEL_PLAIN] = {.name = "plain", .help = "a chain that only hangs (Nalu)"},
+    [MODEL_PLAIN] = {.name = "plain", .help = "a chain that only hangs (Nalu)", SPRINGS},
     // Up to 4 k for each of the two springs of a node.
     [MODEL_CASCADE_THESIS] = {.name = "cascade-thesis",
                               .help = "springs in the joints that nothing pushes back (thesis 4.3)",
+                              SPRINGS,
                               .has_shape = true,
                               .drops_gravity = true,
                               .stiffest_mode = 8.0},
     [MODEL_FOREST_Z] = {.name = "forest-z",
                         .help = "two angles a joint, which lock (thesis 4.2)",
+                        SPRINGS,
                         .has_shape = true,
                         .drops_gravity = true,
                         .has_angles = true},
@@ -57,6 +70,13 @@ ModelKind model_find(const char* name)
     return (ModelKind)kind;
 }
 
+void model_use(SimDefinition* definition, ModelKind model)
+{
+    definition->model = model;
+    definition->stiffness_s2 = models[model].stiffness_s2;
+    definition->fall_off_power = models[model].fall_off_power;
+}
+
 double model_stiffness_bound(const SimDefinition* d)
 {
     double steps_hz = d->rate_hz * d->substeps, mode = models[d->model].stiffest_mode;
@@ -69,6 +89,24 @@ double model_stiffness_bound(const SimDefinition* d)
 double model_joint_damping_bound(const SimDefinition* d)
 {
     return models[d->model].has_angles ? 0.5 * d->rate_hz * d->substeps : 1e30;
+}
+
+static bool is_within(const SimDefinition* d, const char* field, double value, double bound,
+                      Fault* fault)
+{
+    return value <= bound ||
+           fault_set(
+               fault, "simulation: %s is %g; %s at %g Hz and %d substeps is stable to %.0f: %s",
+               field, value, models[d->model].name, d->rate_hz, d->substeps, bound,
+               d->force ? "forced: strands will shake, and those that are lost go back to rest"
+                        : "lower it, raise either, or --force it");
+}
+
+bool model_is_stable(const SimDefinition* d, Fault* fault)
+{
+    return is_within(d, "stiffness_s2", (double)d->stiffness_s2, model_stiffness_bound(d), fault) &&
+           is_within(d, "joint_damping_per_s", (double)d->joint_damping_per_s,
+                     model_joint_damping_bound(d), fault);
 }
 
 float model_stiffness(const SimDefinition* definition, float from_root_m)

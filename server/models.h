@@ -6,6 +6,8 @@
 typedef struct Model {
     const char* name; // as --model
     const char* help;
+    float stiffness_s2; // as it is by default, and how it falls to the tip
+    int fall_off_power;
     bool has_shape;     // rest is equilibrium once gravity is compensated
     bool has_hinges;    // stiffness is of joints, and the clamped root's counts double
     bool drops_gravity; // for compensation
@@ -28,12 +30,19 @@ int choice_find(const char* const* names, const char* name);
 // MODEL_COUNT where there is none of that name.
 ModelKind model_find(const char* name);
 
+// Makes `definition` one of `model`, as stiff as that is by default.
+void model_use(SimDefinition* definition, ModelKind model);
+
 // The largest stable stiffness_s2 for the rate, substeps, damping and drag of `definition`.
 double model_stiffness_bound(const SimDefinition* definition);
 
 // The largest stable joint_damping_per_s: forward Euler wants v dt < J/2 where k is small; 1e30 for
 // other models.
 double model_joint_damping_bound(const SimDefinition* definition);
+
+// False with a fault where a value is beyond its bound: what the bound is, and what to do; of a
+// `definition` that is forced, what will happen.
+bool model_is_stable(const SimDefinition* definition, Fault* fault);
 
 // k/m, 1/s^2, `from_root_m` along the strand at rest: k / max(1, c L)^a. Thesis 5.9 prints k / (L
 // c)^a, which is infinite at the root and exceeds k wherever L c < 1. By length, not by node

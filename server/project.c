@@ -6,7 +6,7 @@
 
 #define REACH_PASSES    64
 #define REACH_TOLERANCE 5e-4f
-#define CLEAR_PASSES    24    // spheres that overlap push into each other: 8 leave 0.9 mm in a run
+#define CLEAR_PASSES    24    // overlapping spheres vie: 8 leave 0.9 mm where a run stops dead
 #define CLEAR_M         1e-6f // nearer to clear than positions resolve
 
 // `node` at `length` from `anchor`, on the side where it is.

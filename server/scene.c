@@ -176,9 +176,12 @@ static bool check_number(const Reader* reader, const Place* place, const json_t*
     bool kind = whole ? json_is_integer(value) : json_is_number(value);
     double number = json_number_value(value);
     if (kind && number >= member->low && number <= member->high) return true;
-    char text[160];
-    snprintf(text, sizeof text, "\"%s\" must be %s from %g to %g", member->key,
-             whole ? "a whole number" : "a number", member->low, member->high);
+    char text[200],
+        *shown = json_dumps(value, JSON_ENCODE_ANY | JSON_COMPACT | JSON_REAL_PRECISION(9));
+    snprintf(text, sizeof text, "\"%s\" is %.40s; it must be %s from %g to %g", member->key,
+             shown != NULL ? shown : "wrong", whole ? "a whole number" : "a number", member->low,
+             member->high);
+    free(shown);
     return fault_at(reader, place, text);
 }
 

@@ -32,7 +32,7 @@ typedef struct Options {
     const char* record;
     int64_t ticks; // 0: until stopped
     bool overwrite, hash, info, quiet, verbose;
-    bool scene_only; // first of two passes over the command line
+    bool is_first_pass; // of two over the command line
     Fault fault;
 } Options;
 
@@ -59,6 +59,8 @@ enum {
     KEY_STIFFNESS,
     KEY_DAMPING,
     KEY_DRAG,
+    KEY_JOINT_DAMPING,
+    KEY_DOWN_SHARE,
     KEY_GRAVITY,
     KEY_THREADS,
     KEY_PROJECT,
@@ -110,13 +112,18 @@ static const struct argp_option option_table[] = {
      "the "
      "links between them",
      2},
-    {"stiffness", KEY_STIFFNESS, "S2", 0, "k/m at the root, 1/s^2 (1600); falls to the tip", 2},
+    {"stiffness", KEY_STIFFNESS, "S2", 0,
+     "k/m at the root, 1/s^2 (1600, falling to the tip; cascade and forest 12000 all along)", 2},
     {"damping", KEY_DAMPING, "S", 0, "Decay of velocity relative to the head, 1/s (8)", 2},
     {"drag", KEY_DRAG, "S", 0, "Decay of velocity relative to the air where a wind blows, 1/s (1)",
      2},
+    {"joint-damping", KEY_JOINT_DAMPING, "S", 0, "v/J of a joint of forest-z, 1/s (60)", 2},
+    {"down-share", KEY_DOWN_SHARE, "SHARE", 0,
+     "The downward springs' part of k in cascade-thesis, 0 to 1 (0.05)", 2},
     {"gravity", KEY_GRAVITY, "on|off", 0,
      "on: rest is where gravity pulls from; off (default): gravity is compensated at rest", 2},
-    {"force", KEY_FORCE, NULL, 0, "Take a stiffness beyond the bound of stability", 2},
+    {"force", KEY_FORCE, NULL, 0, "Take a stiffness or joint damping beyond its bound of stability",
+     2},
     {"kernel", KEY_KERNEL, "NAME", 0,
      "avx512, avx2, sse2 or scalar (default: the widest here); the result does not depend on it",
      2},
@@ -201,6 +208,17 @@ static void parse_style(struct argp_state* state, LoadOptions* load, const char*
         load->styles[load->style_count++] = text;
 }
 
+static void parse_model(struct argp_state* state, SimDefinition* sim, const char* text)
+{
+    ModelKind model = model_find(text);
+    if (model == MODEL_COUNT)
+        argp_error(state,
+                   "--model %s: must be spring, cascade, forest, plain, cascade-thesis or forest-z",
+                   text);
+    else
+        model_use(sim, model);
+}
+
 static error_t parse_what(int key, char* text, struct argp_state* state)
 {
     Options* options = state->input;
@@ -255,13 +273,7 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
                        text);
         break;
     case KEY_MODEL:
-        sim->model = model_find(text);
-        if (sim->model == MODEL_COUNT)
-            argp_error(
-                state,
-                "--model %s: must be spring, cascade, forest, plain, cascade-thesis or forest-z",
-                text);
-        break;
+        break; // the first pass has taken it
     case KEY_KERNEL:
         sim->kernel = text;
         if (kernel_find(text) == NULL)
@@ -293,6 +305,12 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
         break;
     case KEY_DRAG:
         sim->drag_per_s = (float)number(state, "drag", text, 0, 1e4);
+        break;
+    case KEY_JOINT_DAMPING:
+        sim->joint_damping_per_s = (float)number(state, "joint-damping", text, 0, 1e6);
+        break;
+    case KEY_DOWN_SHARE:
+        sim->down_share = (float)number(state, "down-share", text, 0, 1);
         break;
     case KEY_GRAVITY:
         sim->gravity_compensation = !on_off(state, "gravity", text);
@@ -374,7 +392,8 @@ static error_t parse(int key, char* text, struct argp_state* state)
     Options* options = state->input;
     if (key == ARGP_KEY_ARG)
         argp_error(state, "\"%s\" is not an option; did you mean --style %s?", text, text);
-    if (options->scene_only) {
+    if (options->is_first_pass) {
+        if (key == KEY_MODEL) parse_model(state, &options->daemon.sim, text);
         if (key == KEY_SCENE && options->scene != NULL)
             argp_error(state, "--scene %s: a second one, after %s; put all into one scene", text,
                        options->scene);
@@ -386,17 +405,18 @@ static error_t parse(int key, char* text, struct argp_state* state)
     return parse_where(key, text, state);
 }
 
-// Twice: the scene is read between the passes, so that options win over it wherever they stand.
+// Twice: the model is taken in the first pass and the scene is read after it, so that what a model
+// has by default yields to the scene, and that to options wherever they stand.
 static bool read_options(Options* options, int argc, char** argv)
 {
     const struct argp argp = {option_table, parse, NULL, documentation, NULL, NULL, NULL};
     argp_err_exit_status = EXIT_USAGE;
     options->daemon = daemon_default();
-    options->scene_only = true;
+    options->is_first_pass = true;
     argp_parse(&argp, argc, argv, 0, NULL, options);
     const char* scene = options->scene;
     if (scene != NULL && !daemon_use_scene(&options->daemon, scene, &options->fault)) return false;
-    options->scene_only = false;
+    options->is_first_pass = false;
     argp_parse(&argp, argc, argv, 0, NULL, options);
     return true;
 }

@@ -49,7 +49,8 @@ typedef struct Tie {
     bool is_rope;
 } Tie;
 
-// What is simulated and how. Start from sim_default().
+// What is simulated and how. Start from sim_default(), and for another model with model_use() of
+// models.h.
 typedef struct SimDefinition {
     ModelKind model;
     const char* kernel; // "avx512", "avx2", "sse2", "scalar"; NULL: the widest that runs here
