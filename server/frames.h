@@ -46,6 +46,18 @@ INLINE Real3 frames_transport(Real3 u, Real3 a, Real3 d)
     return (Real3){c * u.x + bu.x + b.x * f, c * u.y + bu.y + b.y * f, c * u.z + bu.z + b.z * f};
 }
 
+// The moment of a link's joint with what it passes on of `outer`, that of the next joint out.
+//
+// A link has no twist, so what twists it goes on to the link before, through the joint. That turns
+// as a constant-velocity joint does: it lets pass any rotation but one about d + a, the axis half
+// way. Left out, in a strand bent out of a plane forces are no gradient: stiff ones never come to
+// rest (measured: `bob` with forest at 24,000 1/s^2, under a head that does not move).
+INLINE Real3 frames_pass_twist(Real3 moment, Real3 outer, Real3 a, Real3 d)
+{
+    real twist = real3_dot(outer, d) / real_at_least(1 + real3_dot(a, d), FOLDED);
+    return real3_mad(real3_mad(moment, d, twist), a, twist);
+}
+
 // The head is the frame before link 1: what is local to it is in head space.
 static inline void frames_first(Block* block, const Substep* substep, Lanes3* second)
 {

@@ -30,8 +30,10 @@ static inline void cascade_link(Block* block, int n, real gravity, CascadeOutboa
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
         Real3 d = lane_load(direction, l), a = lane_load(predicted, l);
+        Real3 outer = lane_load(&outboard->moment, l);
         Real3 moment = real3_cross(d, real3_mad(lane_load(carried, l), a, hinge[l]));
-        Real3 turning = real3_sub(moment, lane_load(&outboard->moment, l));
+        moment = frames_pass_twist(moment, outer, a, d);
+        Real3 turning = real3_sub(moment, outer);
         Real3 force = real3_scale(real3_cross(turning, d), per_length[l]);
         Real3 sum = real3_sub(force, lane_load(&outboard->force, l));
         sum = real3_scale(sum, per_mass[l]);

@@ -49,7 +49,8 @@ static inline void forest_joint(Block* block, int n)
     for (int l = 0; l < LANES; ++l) {
         Real3 d = lane_load(direction, l), a = lane_load(predicted, l);
         real k = hinge[l] * forest_arc(real3_dot(a, d));
-        lane_store(moment, l, real3_cross(d, real3_mad(lane_load(moment, l), a, k)));
+        Real3 turning = real3_cross(d, real3_mad(lane_load(moment, l), a, k));
+        lane_store(moment, l, frames_pass_twist(turning, lane_load(moment + 1, l), a, d));
     }
 }
 
@@ -78,7 +79,7 @@ static void forest_accelerate(Block* block, const Substep* substep)
     Lanes3 load = {0};
     real dt2 = (real)substep->dt2, gravity = (real)substep->gravity_m_s2;
     frames_follow(block, substep);
-    for (int n = 1; n < block->nodes; ++n)
+    for (int n = block->nodes - 1; n >= 1; --n)
         forest_joint(block, n);
     for (int n = block->nodes - 1; n >= 1; --n) {
         real share = n == block->nodes - 1 || !substep->outermost ? 1 : 0;

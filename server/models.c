@@ -24,6 +24,7 @@ const Model models[MODEL_COUNT] = {
     [MODEL_CASCADE] = {.name = "cascade",
                        .help = "springs in the joints push and push back (thesis 4.3, corrected)",
                        JOINTS,
+                       .length = LENGTH_DIRECT,
                        .has_shape = true,
                        .has_hinges = true,
                        .stiffest_mode = 16.0},
@@ -33,7 +34,7 @@ const Model models[MODEL_COUNT] = {
                       .has_shape = true,
                       .has_hinges = true,
                       .stiffest_mode = 4.0},
-    [MODEL_PLAIN] = {.name = "plain", .help = "a chain that only hangs (Nalu)", SPRINGS},
+    [MODEL_PLAIN] = {.name = "plain", .help = "a chain that only hangs (Nalu)", SPRINGS, .length = LENGTH_DIRECT},
     // Up to 4 k for each of the two springs of a node.
     [MODEL_CASCADE_THESIS] = {.name = "cascade-thesis",
                               .help = "springs in the joints that nothing pushes back (thesis 4.3)",
@@ -75,6 +76,7 @@ void model_use(SimDefinition* definition, ModelKind model)
     definition->model = model;
     definition->stiffness_s2 = models[model].stiffness_s2;
     definition->fall_off_power = models[model].fall_off_power;
+    definition->length = models[model].length;
 }
 
 double model_stiffness_bound(const SimDefinition* d)

@@ -8,6 +8,7 @@ typedef struct Model {
     const char* help;
     float stiffness_s2; // as it is by default, and how it falls to the tip
     int fall_off_power;
+    LengthStage length;
     bool has_shape;     // rest is equilibrium once gravity is compensated
     bool has_hinges;    // stiffness is of joints, and the clamped root's counts double
     bool drops_gravity; // for compensation

@@ -26,7 +26,7 @@ SimDefinition sim_default(void)
                                 .substeps = 4,
                                 .iterations = 1,
                                 .gravity_m_s2 = 9.81f,
-                                .fall_off_per_m = 25.0f,
+                                .fall_off_per_m = 16.0f,
                                 .damping_per_s = 8.0f,
                                 .drag_per_s = 1.0f,
                                 .joint_damping_per_s = 60.0f,
@@ -302,10 +302,10 @@ static Vec3 across(Vec3 d)
 }
 
 // What the joints need to carry the weight of the strand at rest. From the tip in, link n is in
-// balance where across it T[n] - T[n+1] + length d x F[n] = 0, F the weight outboard; T[n] across
-// link n, because frames do not twist. A moment fixed in the frames would do, and would feed energy
-// into a strand whose head spins: it is no gradient. d x c with c = T x d is that of the potential
-// -c.d, a pull on the link's end that stays in the frame, and is T[n] at rest.
+// balance where M[n] - M[n+1] + length d x F[n] = 0, F the weight outboard. What of M twists the
+// link its joint passes on (frames.h); the rest is d x c with c = M x d, and that is the moment of
+// the potential -c.d: a pull on the link's end that stays in the frame. A moment that stayed in the
+// frame would be no gradient, and would feed energy into a strand whose head spins.
 //
 // In its rest pose a strand does not sag; tilted it hangs another way. Too soft a strand that
 // stands up falls over all the same.
@@ -316,9 +316,7 @@ static void fill_carried(Vec3* carried, const SimDefinition* d, const Vec3* rest
     for (int n = d->nodes - 1; n >= 1; --n) {
         load.y -= is_carried ? d->gravity_m_s2 * (float)mass_of(d, n) : 0.0f;
         moment = vec3_sub(moment, vec3_cross(link_of(rest, n), load));
-        Vec3 way = vec3_normalise_or(link_of(rest, n), vec3(0, -1, 0));
-        moment = vec3_mad(moment, way, -vec3_dot(moment, way));
-        carried[n] = vec3_cross(moment, way);
+        carried[n] = vec3_cross(moment, vec3_normalise_or(link_of(rest, n), vec3(0, -1, 0)));
     }
 }
 
