@@ -36,11 +36,15 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
     }
 }
 
-static void step_gang(const Sim* sim, int gang)
+static void step_gang(const Sim* sim, int gang, int thread)
 {
     int first = gang * KERNEL_GANG, left = sim->block_count - first;
-    sim->kernel->step(&sim->blocks[first], left < KERNEL_GANG ? left : KERNEL_GANG, sim->substeps,
-                      sim->definition.substeps);
+    int count = left < KERNEL_GANG ? left : KERNEL_GANG;
+    size_t bytes = strands_work_bytes(sim->definition.nodes);
+    for (int b = 0; b < count; ++b)
+        strands_lend(&sim->blocks[first + b],
+                     sim->work + bytes * (size_t)(thread * KERNEL_GANG + b));
+    sim->kernel->step(&sim->blocks[first], count, sim->substeps, sim->definition.substeps);
 }
 
 void sim_step(Sim* sim, const SimHead* heads)
@@ -51,10 +55,10 @@ void sim_step(Sim* sim, const SimHead* heads)
     // libgomp allocates a team for a nested region, even of one thread; a plain loop does not.
     if (threads <= 1 || gangs == 1 || omp_in_parallel()) {
         for (int g = 0; g < gangs; ++g)
-            step_gang(sim, g);
+            step_gang(sim, g, 0);
         return;
     }
 #pragma omp parallel for num_threads(threads) schedule(static)
     for (int g = 0; g < gangs; ++g)
-        step_gang(sim, g);
+        step_gang(sim, g, omp_get_thread_num());
 }
