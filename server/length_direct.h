@@ -22,7 +22,7 @@ static inline void length_eliminate(Block* block, int n)
     const real* rest = block->length[n].v;
     Lanes3* d = &block->direction[n];
     Lanes *pivot = &block->pivot[n], *tension = &block->tension[n];
-    real chained = n > 1 ? 1 : 0;
+    bool is_first = n == 1; // nothing is before it, and what stands there is not even a number
     LANE_LOOP
     for (int l = 0; l < LANES; ++l) {
         real x = q->x[l] - p->x[l], y = q->y[l] - p->y[l], z = q->z[l] - p->z[l];
@@ -37,7 +37,7 @@ static inline void length_eliminate(Block* block, int n)
         error = both > 0 ? error : 0;
         both = both > 0 ? both : 1;
         real cosine = x * before->x[l] + y * before->y[l] + z * before->z[l];
-        real shared = -chained * inner->v[l] * cosine;
+        real shared = is_first ? 0 : -inner->v[l] * cosine;
         real factor = shared * pivot_before->v[l];
         real left = both - factor * shared;
         pivot->v[l] = 1 / (left > LEAST_PIVOT ? left : LEAST_PIVOT);

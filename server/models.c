@@ -34,7 +34,10 @@ const Model models[MODEL_COUNT] = {
                       .has_shape = true,
                       .has_hinges = true,
                       .stiffest_mode = 4.0},
-    [MODEL_PLAIN] = {.name = "plain", .help = "a chain that only hangs (Nalu)", SPRINGS, .length = LENGTH_DIRECT},
+    [MODEL_PLAIN] = {.name = "plain",
+                     .help = "a chain that only hangs (Nalu)",
+                     SPRINGS,
+                     .length = LENGTH_DIRECT},
     // Up to 4 k for each of the two springs of a node.
     [MODEL_CASCADE_THESIS] = {.name = "cascade-thesis",
                               .help = "springs in the joints that nothing pushes back (thesis 4.3)",

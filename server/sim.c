@@ -147,21 +147,17 @@ static size_t clearances(const SimDefinition* d)
 static size_t block_bytes(const SimDefinition* d)
 {
     return (size_t)d->nodes *
-               (14 * sizeof(Lanes3) + 3 * sizeof(Angles) + (13 + clearances(d)) * sizeof(Lanes)) +
-           sizeof(Lanes3);
+           (10 * sizeof(Lanes3) + 3 * sizeof(Angles) + (13 + clearances(d)) * sizeof(Lanes));
 }
 
 static void cut_block(Block* block, const SimDefinition* d, char* arena)
 {
     size_t nodes = (size_t)d->nodes;
     block->nodes = d->nodes;
-    Lanes3** vectors[] = {&block->position,  &block->previous,     &block->reference,
-                          &block->direction, &block->acceleration, &block->predicted,
-                          &block->rest,      &block->along,        &block->across,
-                          &block->carried};
+    Lanes3** vectors[] = {&block->position, &block->previous, &block->reference, &block->rest,
+                          &block->along,    &block->across,   &block->carried};
     for (size_t i = 0; i < sizeof vectors / sizeof vectors[0]; ++i)
         *vectors[i] = cut(&arena, nodes, sizeof(Lanes3));
-    block->moment = cut(&arena, nodes + 1, sizeof(Lanes3));
     Lanes** numbers[] = {&block->length,    &block->per_length, &block->keep,
                          &block->stiffness, &block->hinge,      &block->mass,
                          &block->per_mass,  &block->outer_part, &block->inner_part};
@@ -387,16 +383,19 @@ static bool allocate(Sim* sim, const SimDefinition* d)
     sim->block_count = (d->strands + LANES - 1) / LANES;
     sim->blocks = calloc((size_t)sim->block_count, sizeof *sim->blocks);
     sim->memory = aligned_alloc(64, (size_t)sim->block_count * block_bytes(d));
+    sim->work = aligned_alloc(64, strands_work_bytes(d->nodes) * KERNEL_GANG * (size_t)d->threads);
     sim->substeps = calloc((size_t)d->substeps, sizeof *sim->substeps);
     sim->colliders = calloc(colliders + 1, sizeof *sim->colliders);
     sim->axes = calloc(colliders * (size_t)d->substeps + 1, sizeof *sim->axes);
     sim->ties = calloc((size_t)d->tie_count + 1, sizeof *sim->ties);
-    return sim->blocks && sim->memory && sim->substeps && sim->colliders && sim->axes && sim->ties;
+    return sim->blocks && sim->memory && sim->work && sim->substeps && sim->colliders &&
+           sim->axes && sim->ties;
 }
 
 static void fill(Sim* sim, const SimDefinition* d)
 {
     memset(sim->memory, 0, (size_t)sim->block_count * block_bytes(d));
+    memset(sim->work, 0, strands_work_bytes(d->nodes) * KERNEL_GANG * (size_t)d->threads);
     for (int b = 0; b < sim->block_count; ++b) {
         cut_block(&sim->blocks[b], d, (char*)sim->memory + (size_t)b * block_bytes(d));
         fill_block(&sim->blocks[b], d, b * LANES);
@@ -435,6 +434,7 @@ void sim_destroy(Sim* sim)
     if (sim == NULL) return;
     free(sim->blocks);
     free(sim->memory);
+    free(sim->work);
     free(sim->substeps);
     free(sim->colliders);
     free(sim->axes);

@@ -58,11 +58,16 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
     }
 }
 
-static void step_gang(const Sim* sim, int gang, const Substep* substeps, int count)
+static void step_gang(const Sim* sim, int gang, int thread, const Substep* substeps,
+                      int substep_count)
 {
     int first = gang * KERNEL_GANG, left = sim->block_count - first;
-    sim->kernel->step(&sim->blocks[first], left < KERNEL_GANG ? left : KERNEL_GANG, substeps,
-                      count);
+    int count = left < KERNEL_GANG ? left : KERNEL_GANG;
+    size_t bytes = strands_work_bytes(sim->definition.nodes);
+    for (int b = 0; b < count; ++b)
+        strands_lend(&sim->blocks[first + b],
+                     sim->work + bytes * (size_t)(thread * KERNEL_GANG + b));
+    sim->kernel->step(&sim->blocks[first], count, substeps, substep_count);
 }
 
 static void step_all(const Sim* sim, const Substep* substeps, int count)
@@ -72,12 +77,12 @@ static void step_all(const Sim* sim, const Substep* substeps, int count)
     // libgomp allocates a team for a nested region, even of one thread; a plain loop does not.
     if (threads <= 1 || gangs == 1 || omp_in_parallel()) {
         for (int g = 0; g < gangs; ++g)
-            step_gang(sim, g, substeps, count);
+            step_gang(sim, g, 0, substeps, count);
         return;
     }
 #pragma omp parallel for num_threads(threads) schedule(static)
     for (int g = 0; g < gangs; ++g)
-        step_gang(sim, g, substeps, count);
+        step_gang(sim, g, omp_get_thread_num(), substeps, count);
 }
 
 // Strands that are not tied to each other run through the whole tick while they are in the cache;

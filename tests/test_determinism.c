@@ -68,6 +68,7 @@ static uint64_t hash_of_run(int threads, float pearl_radius_m)
     d.collider_count = 2;
     d.threads = threads;
     d.pearl_radius_m = pearl_radius_m;
+    d.fall_off_per_m = 25.0f; // as it was when the literal was
     Fault fault = {0};
     Sim* sim = sim_create(&d, &fault);
     if (sim == NULL) fail_msg("%s", fault.text);

@@ -329,6 +329,53 @@ static void a_hanging_chain_stretches_as_its_closed_form(void** state)
     sim_destroy(sim);
 }
 
+// Positions after one tick from rest under a head that has turned.
+static void turned_once(const Vec3* rest, int nodes, int iterations, Vec3* position)
+{
+    Vec3 previous[NODES];
+    SimDefinition d = sim_default();
+    d.strands = 1;
+    d.nodes = nodes;
+    d.rest = rest;
+    d.substeps = 1;
+    d.iterations = iterations;
+    Sim* sim = create(d);
+    SimHead head = {.second_difference = {0.004f, -0.001f, 0.002f}};
+    rotation_of(head.rotation, tilt(20.0));
+    sim_step(sim, &head);
+    sim_state(sim, position, previous);
+    sim_destroy(sim);
+}
+
+// One sweep from root to tip, link by link; the root does not move.
+static void sweep_lengths(const Vec3* rest, int nodes, Vec3* p)
+{
+    for (int n = 1; n < nodes; ++n) {
+        Vec3 way = vec3_sub(p[n], p[n - 1]);
+        float length = sqrtf(way.x * way.x + way.y * way.y + way.z * way.z);
+        float error = length - vec3_length(vec3_sub(rest[n], rest[n - 1]));
+        float excess = fabsf(error) > 2.5e-7f ? error / length : 0.0f;
+        p[n - 1] = vec3_mad(p[n - 1], way, (n == 1 ? 0.0f : 0.5f) * excess);
+        p[n] = vec3_mad(p[n], way, (n == 1 ? -1.0f : -0.5f) * excess);
+    }
+}
+
+static void sweeps_side_by_side_have_the_bits_of_one_after_another(void** state)
+{
+    (void)state;
+    Vec3 rest[NODES], position[NODES], wanted[NODES];
+    for (int nodes = 2; nodes <= NODES; ++nodes)
+        for (int iterations = 1; iterations <= 5; ++iterations) {
+            hang(rest, 1, nodes, LINK_M);
+            turned_once(rest, nodes, 0, wanted);
+            for (int i = 0; i < iterations; ++i)
+                sweep_lengths(rest, nodes, wanted);
+            turned_once(rest, nodes, iterations, position);
+            if (memcmp(position, wanted, (size_t)nodes * sizeof *position) != 0)
+                fail_msg("%d nodes, %d sweeps end elsewhere", nodes, iterations);
+        }
+}
+
 static void published_lengths_are_those_at_rest(void** state)
 {
     (void)state;
@@ -546,6 +593,7 @@ int main(void)
         cmocka_unit_test(hair_a_hundred_kilometres_away_moves_alike),
         cmocka_unit_test(a_turned_state_moves_like_the_unturned_one),
         cmocka_unit_test(a_hanging_chain_stretches_as_its_closed_form),
+        cmocka_unit_test(sweeps_side_by_side_have_the_bits_of_one_after_another),
         cmocka_unit_test(published_lengths_are_those_at_rest),
         cmocka_unit_test(a_skinned_tip_stays_on_the_head_and_links_keep_their_length),
         cmocka_unit_test(a_share_of_skin_means_the_same_at_every_rate),

@@ -134,7 +134,7 @@ static void a_crest_is_one_sheet(void** state)
     float woven = torn(style);
     style->hold_count = 0;
     float loose = torn(style);
-    assert_true(woven < 1.2f && loose > 1.4f);
+    assert_true(woven < 1.15f && loose > 1.3f);
     hairstyle_destroy(style);
 }
 

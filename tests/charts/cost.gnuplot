@@ -22,4 +22,4 @@ plot ours("spring") using 5:13 with linespoints lw 2 pt 7 lc rgb SPRING title "s
          title "cascade, Pentium 4", \
      thesis("forest") using 3:4 with linespoints lw 1 dt 3 pt 6 lc rgb FOREST \
          title "forest, Pentium 4", \
-     [32:24000] 0.01 * x with lines lw 1 dt 4 lc rgb BOUND title "linear in strands"
+     [32:24000] 0.012 * x with lines lw 1 dt 4 lc rgb BOUND title "linear in strands"
