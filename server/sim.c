@@ -179,6 +179,7 @@ static void cut_block(Block* block, const SimDefinition* d, char* arena)
 {
     size_t nodes = (size_t)d->nodes;
     block->nodes = d->nodes;
+    block->rows = d->nodes;
     Lanes3** vectors[] = {&block->position,  &block->previous,     &block->reference,
                           &block->direction, &block->acceleration, &block->predicted,
                           &block->rest,      &block->along,        &block->across,
