@@ -325,6 +325,7 @@ static const Case cases[] = {
 
 static const Study studies[] = {
     {"sim", "what a tick costs, by model, kernel, strands, nodes, iterations, threads", study_sim},
+    {"tree", "what the Adaptive Wisp Tree saves and what it gets wrong", study_tree},
 };
 #define STUDIES (sizeof studies / sizeof studies[0])
 

@@ -12,6 +12,7 @@ typedef struct Study {
 } Study;
 
 bool study_sim(Fault* fault);
+bool study_tree(Fault* fault);
 
 // "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.
 void study_machine(void);
