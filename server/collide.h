@@ -77,7 +77,7 @@ static void collide_nodes(Block* block, const Substep* substep)
     for (int k = 0; k < substep->collider_count; ++k) {
         const Axis* axis = &substep->axis[k];
         for (int n = 1; n < block->nodes; ++n) {
-            const real* clearance = block->clearance[k * block->nodes + n].v;
+            const real* clearance = block->clearance[k * block->rows + n].v;
             bool is_near = axis->inverse2 > 0
                                ? any_near(&block->position[n], clearance, axis, false)
                                : any_near(&block->position[n], clearance, axis, true);

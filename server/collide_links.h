@@ -97,7 +97,7 @@ static void collide_links(Block* block, const Substep* substep)
 {
     for (int k = 0; k < substep->collider_count; ++k)
         for (int n = 1; n < block->nodes; ++n) {
-            const real* clearance = block->clearance_of_link[k * block->nodes + n].v;
+            const real* clearance = block->clearance_of_link[k * block->rows + n].v;
             if (any_link_near(block, n, clearance, &substep->axis[k]))
                 push_link_out(block, n, clearance, &substep->axis[k]);
         }

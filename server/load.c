@@ -705,7 +705,7 @@ static void print_set(const Hairstyle* style, const StrandSet* set)
 
 static void print_collider(int number, const Collider* c)
 {
-    bool is_sphere = memcmp(&c->from, &c->to, sizeof c->from) == 0;
+    bool is_sphere = vec3_length(vec3_sub(c->to, c->from)) == 0.0f;
     printf("  %s %2d at %7.4f %7.4f %7.4f m", is_sphere ? "sphere" : "capsule", number,
            (double)c->from.x, (double)c->from.y, (double)c->from.z);
     if (!is_sphere)

@@ -154,6 +154,7 @@ static void cut_block(Block* block, const SimDefinition* d, char* arena)
 {
     size_t nodes = (size_t)d->nodes;
     block->nodes = d->nodes;
+    block->rows = d->nodes;
     Lanes3** vectors[] = {&block->position, &block->previous, &block->reference, &block->rest,
                           &block->along,    &block->across,   &block->carried};
     for (size_t i = 0; i < sizeof vectors / sizeof vectors[0]; ++i)

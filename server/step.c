@@ -1,6 +1,7 @@
 // A tick: the head's motion to substeps, blocks to kernels, blocks to threads.
+#include "server/step.h"
+
 #include "messages/trig.h"
-#include "server/strands.h"
 #include "server/ties.h"
 
 #include <omp.h>
@@ -16,11 +17,16 @@ static void meet_air(const SimDefinition* definition, Substep* substep, const Si
     substep->air_move = vec3_sub(vec3_scale(head->wind, substep->dt), head->move);
 }
 
+static bool is_sphere(const Collider* c)
+{
+    return c->from.x == c->to.x && c->from.y == c->to.y && c->from.z == c->to.z;
+}
+
 static Axis axis_of(const Collider* c, const Body* before, const Body* now)
 {
     Vec3 from = body_place(now, c->from), was = body_place(before, c->from);
     Axis axis = {.from = from, .from_move = vec3_sub(from, was)};
-    if (memcmp(&c->from, &c->to, sizeof c->from) == 0) return axis;
+    if (is_sphere(c)) return axis;
     Vec3 then = vec3_sub(body_place(before, c->to), was);
     axis.along = vec3_sub(body_place(now, c->to), from);
     axis.along_move = vec3_sub(axis.along, then);
@@ -46,7 +52,7 @@ static void place_colliders(Sim* sim, Axis* axes, const SimHead* head)
 }
 
 // The parts of the substeps that the head's motion decides, and the wind.
-static void prepare_substeps(Sim* sim, const SimHead* heads)
+void step_prepare(Sim* sim, const SimHead* heads)
 {
     for (int s = 0; s < sim->definition.substeps; ++s) {
         Substep* substep = &sim->substeps[s];
@@ -58,11 +64,9 @@ static void prepare_substeps(Sim* sim, const SimHead* heads)
     }
 }
 
-static void step_gang(const Sim* sim, int gang, int thread, const Substep* substeps,
-                      int substep_count)
+void step_blocks(const Sim* sim, int first, int count, int thread, const Substep* substeps,
+                 int substep_count)
 {
-    int first = gang * KERNEL_GANG, left = sim->block_count - first;
-    int count = left < KERNEL_GANG ? left : KERNEL_GANG;
     size_t bytes = strands_work_bytes(sim->definition.nodes);
     for (int b = 0; b < count; ++b)
         strands_lend(&sim->blocks[first + b],
@@ -70,7 +74,13 @@ static void step_gang(const Sim* sim, int gang, int thread, const Substep* subst
     sim->kernel->step(&sim->blocks[first], count, substeps, substep_count);
 }
 
-static void step_all(const Sim* sim, const Substep* substeps, int count)
+static void step_gang(const Sim* sim, int gang, int thread, const Substep* substeps, int count)
+{
+    int first = gang * KERNEL_GANG, left = sim->block_count - first;
+    step_blocks(sim, first, left < KERNEL_GANG ? left : KERNEL_GANG, thread, substeps, count);
+}
+
+void step_all(const Sim* sim, const Substep* substeps, int count)
 {
     int gangs = (sim->block_count + KERNEL_GANG - 1) / KERNEL_GANG;
     int threads = sim->definition.threads;
@@ -91,7 +101,7 @@ static void step_all(const Sim* sim, const Substep* substeps, int count)
 void sim_step(Sim* sim, const SimHead* heads)
 {
     const SimDefinition* d = &sim->definition;
-    prepare_substeps(sim, heads);
+    step_prepare(sim, heads);
     if (d->tie_count == 0) {
         step_all(sim, sim->substeps, d->substeps);
         return;

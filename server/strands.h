@@ -59,6 +59,7 @@ typedef struct Angles {
 // to n, stands at n, and entry 0 is unused.
 struct Block {
     int nodes;
+    int rows;            // from one collider's clearances to the next one's
     int strands;         // lanes beyond them repeat the last
     int skinned;         // nodes before it are skinned, in part and in some lane; the rest is free
     int64_t quarantined; // times that a strand was put back (quarantine.h)
