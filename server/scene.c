@@ -390,6 +390,7 @@ static const Member simulation_members[] = {
     {"drag_per_s", read_float, offsetof(SimDefinition, drag_per_s), 0, 1e4, false},
     {"joint_damping_per_s", read_float, offsetof(SimDefinition, joint_damping_per_s), 0, 1e6,
      false},
+    {"upside_down_share", read_float, offsetof(SimDefinition, upside_down_share), 0, 1, false},
     {"down_share", read_float, offsetof(SimDefinition, down_share), 0, 1, false},
     {"gravity_m_s2", read_float, offsetof(SimDefinition, gravity_m_s2), -1000, 1000, false},
     {"pearl_radius_m", read_float, offsetof(SimDefinition, pearl_radius_m), 0, 1, false},

@@ -60,6 +60,7 @@ enum {
     KEY_DAMPING,
     KEY_DRAG,
     KEY_JOINT_DAMPING,
+    KEY_UPSIDE_DOWN,
     KEY_DOWN_SHARE,
     KEY_GRAVITY,
     KEY_THREADS,
@@ -118,6 +119,8 @@ static const struct argp_option option_table[] = {
     {"drag", KEY_DRAG, "S", 0, "Decay of velocity relative to the air where a wind blows, 1/s (1)",
      2},
     {"joint-damping", KEY_JOINT_DAMPING, "S", 0, "v/J of a joint of forest-z, 1/s (60)", 2},
+    {"upside-down", KEY_UPSIDE_DOWN, "SHARE", 0,
+     "spring: what is left of its strength upside down, 0 to 1 (1); by the cosine between", 2},
     {"down-share", KEY_DOWN_SHARE, "SHARE", 0,
      "The downward springs' part of k in cascade-thesis, 0 to 1 (0.05)", 2},
     {"gravity", KEY_GRAVITY, "on|off", 0,
@@ -308,6 +311,9 @@ static error_t parse_how(int key, char* text, struct argp_state* state)
         break;
     case KEY_JOINT_DAMPING:
         sim->joint_damping_per_s = (float)number(state, "joint-damping", text, 0, 1e6);
+        break;
+    case KEY_UPSIDE_DOWN:
+        sim->upside_down_share = (float)number(state, "upside-down", text, 0, 1);
         break;
     case KEY_DOWN_SHARE:
         sim->down_share = (float)number(state, "down-share", text, 0, 1);

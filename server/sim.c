@@ -30,6 +30,7 @@ SimDefinition sim_default(void)
                                 .damping_per_s = 8.0f,
                                 .drag_per_s = 1.0f,
                                 .joint_damping_per_s = 60.0f,
+                                .upside_down_share = 1.0f,
                                 .down_share = 0.05f,
                                 .collide = COLLIDE_PEARL,
                                 .pearl_radius_m = 0.006f,
@@ -122,6 +123,7 @@ static bool check(const SimDefinition* d, Fault* fault)
            in_range(d->tie_count, 0, SIM_MAX_TIES, "ties", fault) &&
            in_range(d->rate_hz, 1, 100000, "rate_hz", fault) &&
            in_range(d->substeps, 1, SIM_MAX_SUBSTEPS, "substeps", fault) && check_tuned(d, fault) &&
+           in_range((double)d->upside_down_share, 0, 1, "upside_down_share", fault) &&
            in_range((double)d->down_share, 0, d->force ? 10 : 1, "down_share", fault) &&
            in_range((double)d->tip_mass, 0.01, 100, "tip_mass", fault) &&
            in_range((double)d->fall_off_per_m, 0, 1e6, "fall_off_per_m", fault) &&
@@ -361,8 +363,6 @@ static void fill_substeps(Sim* sim)
 {
     const SimDefinition* d = &sim->definition;
     double dt = 1.0 / (d->rate_hz * d->substeps);
-    bool compensated = d->gravity_compensation && models[d->model].drops_gravity;
-    float gravity = d->gravity_m_s2 - (compensated ? sim->gravity_at_rest : 0.0f);
     for (int s = 0; s < d->substeps; ++s)
         sim->substeps[s] =
             (Substep){.dt = (float)dt,
@@ -371,7 +371,6 @@ static void fill_substeps(Sim* sim)
                       .outermost = d->outermost,
                       .down_share = d->down_share,
                       .velocity_kept = (float)trig_exp(-(double)d->damping_per_s * dt),
-                      .gravity_m_s2 = gravity,
                       .iterations = d->iterations,
                       .solve_directly = d->length == LENGTH_DIRECT,
                       .collide_links = d->collide == COLLIDE_SEGMENT,

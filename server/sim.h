@@ -77,8 +77,11 @@ typedef struct SimDefinition {
     float damping_per_s;
     float drag_per_s;          // where a wind blows, velocity relative to it decays as exp(-drag t)
     float joint_damping_per_s; // forest-z: v/J of a joint, J = m d^2 (thesis 4.2.2)
-    float down_share;          // cascade-thesis: the downward springs' part of the upward ones' k
-    float pearl_radius_m;      // how thick a strand is where it collides
+    // spring: what is left upside down of the stiffness, and of the weight that it carries; between
+    // by the cosine of the tilt. 1: nothing is lost. (Thesis 4.4: alpha / k.)
+    float upside_down_share;
+    float down_share;     // cascade-thesis: the downward springs' part of the upward ones' k
+    float pearl_radius_m; // how thick a strand is where it collides
     // Rest is equilibrium under gravity: at every tilt (spring, cascade-thesis, forest-z: gravity
     // is left out), untilted (cascade, forest: the joints carry the weight), not at all (plain).
     bool gravity_compensation;

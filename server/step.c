@@ -2,12 +2,25 @@
 #include "server/step.h"
 
 #include "messages/trig.h"
+#include "server/models.h"
 #include "server/ties.h"
 
 #include <omp.h>
 #include <string.h>
 
 #define FULL_DRAG_M_S 1.0f // of wind
+
+// How strong springs are under the head's tilt, k_m / k of thesis 4.4; what they do not hold of the
+// weight, the strand feels. Without a share both are as they were, to the bit.
+static void weigh(const Sim* sim, Substep* substep)
+{
+    const SimDefinition* d = &sim->definition;
+    float up = 0.5f * (1.0f + substep->rotation[4]), share = d->upside_down_share;
+    substep->strength = d->model == MODEL_SPRING ? share + (1.0f - share) * up : 1.0f;
+    bool is_carried = d->gravity_compensation && models[d->model].drops_gravity;
+    float carried = is_carried ? sim->gravity_at_rest * substep->strength : 0.0f;
+    substep->gravity_m_s2 = d->gravity_m_s2 - carried;
+}
 
 static void meet_air(const SimDefinition* definition, Substep* substep, const SimHead* head)
 {
@@ -58,6 +71,7 @@ void step_prepare(Sim* sim, const SimHead* heads)
         Substep* substep = &sim->substeps[s];
         memcpy(substep->rotation, heads[s].rotation, sizeof substep->rotation);
         substep->second_difference = heads[s].second_difference;
+        weigh(sim, substep);
         meet_air(&sim->definition, substep, &heads[s]);
         substep->axis = sim->axes + sim->definition.collider_count * s;
         place_colliders(sim, sim->axes + sim->definition.collider_count * s, &heads[s]);

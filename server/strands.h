@@ -121,6 +121,7 @@ struct Substep {
     float dt2;              // s^2
     float velocity_kept;    // exp(-damping dt)
     float gravity_m_s2;     // what compensation leaves of it
+    float strength;         // spring: of its stiffness, what the tilt leaves
     float drag;             // the share of a node's velocity against the air that the air takes
     Vec3 air_move;          // of the air past the head, m
     int model;              // ModelKind

@@ -259,6 +259,36 @@ static void plain_forest_and_cascade_of_one_link_are_the_pendulum(void** state)
 #endif
 }
 
+// Thesis 4.4: k_m falls with the tilt to `share` of k, and as much of the weight is not carried.
+static void a_tilted_spring_is_weaker_and_sags(void** state)
+{
+    (void)state;
+    const double share = 0.25, k = 400;
+    for (int degrees = 0; degrees <= 180; degrees += 45) {
+        double angle = degrees * M_PI / 180, strength = share + (1 - share) * (1 + cos(angle)) / 2;
+        Strand strand;
+        straight(&strand, 1, vec3(0, 1, 0));
+        SimDefinition d = bare(MODEL_SPRING, 1);
+        d.gravity_compensation = true;
+        d.upside_down_share = (float)share;
+        d.stiffness_s2 = (float)k;
+        d.iterations = 0; // no link: the node and its spring
+        d.damping_per_s = 20;
+        d.substeps = 4;
+        start(&strand, d);
+        float c = (float)cos(angle), n = (float)sin(angle);
+        SimHead heads[MAX_SUBS] = {0};
+        for (int s = 0; s < strand.substeps; ++s)
+            memcpy(heads[s].rotation, (float[9]){c, -n, 0, n, c, 0, 0, 0, 1}, sizeof identity);
+        for (int i = 0; i < 600; ++i)
+            sim_step(strand.sim, heads);
+        assert_near(node(&strand, 1).x, -LENGTH_M * sin(angle), 1e-5);
+        double sag = GRAVITY * (1 - strength) / (strength * k);
+        assert_near(node(&strand, 1).y, LENGTH_M * cos(angle) - sag, 1e-4 * sag + 1e-5);
+        sim_destroy(strand.sim);
+    }
+}
+
 #ifdef SIM_DOUBLE
 // Does a node on a spring of `k` cross its rest place after a push? Without oscillating it comes
 // back iff k dt^2 <= (1 - sqrt c)^2.
@@ -446,13 +476,67 @@ static void every_kernel_gives_the_same_bits(void** state)
 }
 #endif
 
+// A curl of a turn and a half, of the standard length.
+static void curl(Strand* strand)
+{
+    const double radius = 0.025, turns = 1.5;
+    double around = 2 * M_PI * turns,
+           rise = sqrt(LENGTH_M * LENGTH_M - radius * radius * around * around);
+    strand->links = 7;
+    for (int n = 0; n <= 7; ++n) {
+        double part = n / 7.0, angle = around * part;
+        strand->rest[n] = vec3((float)(radius * (cos(angle) - 1)), (float)(-rise * part),
+                               (float)(radius * sin(angle)));
+    }
+}
+
+// How fast nodes go at most in the next two seconds, m/s.
+static double speed_of(Strand* strand)
+{
+    Vec3 now[MAX_LINKS + 1], before[MAX_LINKS + 1];
+    double most = 0, dt = 1.0 / (60.0 * strand->substeps);
+    for (int i = 0; i < 120; ++i) {
+        run(strand, 1);
+        sim_state(strand->sim, now, before);
+        for (int n = 1; n <= strand->links; ++n)
+            most = fmax(most, (double)vec3_length(vec3_sub(now[n], before[n])) / dt);
+    }
+    return most;
+}
+
+// Bent out of a plane, undamped, carrying its weight: what moves by the gradient of an energy may
+// not gain any. Neither may a strand under a head that spins (tests/charts/map-spin.png).
+static void a_curled_strand_gains_no_energy_from_its_joints(void** state)
+{
+    (void)state;
+    Strand strand;
+    curl(&strand);
+    SimDefinition d = bare(MODEL_FOREST, 7);
+    d.gravity_compensation = true;
+    d.stiffness_s2 = 12000;
+    d.substeps = 16;
+    start(&strand, d);
+    SimHead heads[MAX_SUBS] = {0};
+    for (int s = 0; s < d.substeps; ++s)
+        memcpy(heads[s].rotation, identity, sizeof identity);
+    heads[0].second_difference = vec3(2e-4f, 1e-4f, 3e-4f); // a knock
+    sim_step(strand.sim, heads);
+    double first = speed_of(&strand), last = first;
+    for (int i = 0; i < 10; ++i)
+        last = speed_of(&strand);
+    assert_true(first > 1 && last < 1.1 * first);
+    sim_destroy(strand.sim);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_curled_strand_gains_no_energy_from_its_joints),
         cmocka_unit_test(forest_sags_as_the_hinge_chain),
         cmocka_unit_test(cascade_sags_by_its_own_law),
         cmocka_unit_test(cascade_is_the_beam_where_it_bends_little),
         cmocka_unit_test(spring_sags_by_g_m_over_k),
+        cmocka_unit_test(a_tilted_spring_is_weaker_and_sags),
         cmocka_unit_test(one_sweep_leaves_the_stretch_of_the_closed_form),
         cmocka_unit_test(plain_swings_in_the_heavy_chains_modes),
         cmocka_unit_test(plain_forest_and_cascade_of_one_link_are_the_pendulum),
