@@ -238,7 +238,7 @@ void map_colliders(Points* points)
     panel_measure(&panel, points);
     panel.name = "segment";
     panel.collide = COLLIDE_SEGMENT;
-    panel.derived = NULL; // nothing is cut at all
+    panel.derived = NULL; // only long, thin links cut at all
     panel_measure(&panel, points);
     panel.name = "point"; // a pearl of no radius
     panel.collide = COLLIDE_PEARL;

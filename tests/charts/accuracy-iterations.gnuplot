@@ -11,7 +11,7 @@ spring(length, rest) = "< awk -F, '" . \
     " accuracy.csv | sort -t, -g -k1"
 
 set multiplot layout 1,2 margins 0.07,0.985,0.12,0.84 spacing 0.09,0 \
-    title "For the same time substeps give up to six times less error than sweeps, and a direct solve far less stretch than either\n{/*0.85 spring, damping 15/s, geometric mean over shake, flip, turn and gust}"
+    title "For the same time substeps give up to 6 times less error than sweeps, and from 120 Hz on a direct solve 20 to 280 times less stretch\n{/*0.85 spring, damping 15/s, geometric mean over shake, flip, turn and gust}"
 set logscale xy
 set xlabel "µs a tick, 121 strands of 8 nodes"
 set xrange [0.7:110]
@@ -20,7 +20,7 @@ set key inside bottom left vertical Left reverse samplen 2 spacing 1.1
 SHADES = "#08306b #2171b5 #4292c6 #74a9cf #a6bddb"
 
 set ylabel "rms error / strand length" offset 1,0
-set yrange [3e-4:0.1]
+set yrange [1e-4:0.1]
 plot for [i = 0:4] spring("sweeps", "$7 == " . (60 * 2**i)) using 1:2 with linespoints pt 7 ps 0.8 lw 1.5 lc rgb word(SHADES, i + 1) title sprintf("%d Hz: 1, 2, 4, 8, 16 sweeps", 60 * 2**i), \
      spring("sweeps", "$8 == 1") using 1:2 with lines lw 2.5 lc rgb CASCADE title "1 sweep: 60, 120 ... 960 Hz", \
      spring("direct", "$8 == 1") using 1:2 with linespoints pt 4 ps 1 lw 2.5 lc rgb FOREST title "1 direct solve: 60, 120 ... 960 Hz", \

@@ -53,7 +53,7 @@ function cell(column, name,   v) {
     }
     if (column == 2) {
         g = grade(stretch[name], 0.5, 50)
-        return sprintf("%.0f", stretch[name])
+        return sprintf("%.1f", stretch[name])
     }
     if (column == 3) {
         v = free[name] / frees[name]
