@@ -104,8 +104,8 @@ static const struct argp_option option_table[] = {
     {"substeps", KEY_SUBSTEPS, "N", 0, "Steps of a tick (4)", 2},
     {"iterations", KEY_ITERATIONS, "N", 0, "Length corrections of a substep (1)", 2},
     {"length", KEY_LENGTH, "sweeps|direct", 0,
-     "sweeps (default): links corrected one after another; direct: all at once, at twice the price "
-     "and, from 2 iterations on, with less stretch for it",
+     "sweeps: links corrected one after another; direct (default of cascade and plain): all at "
+     "once, at twice the price and, from 2 iterations on, with less stretch for it",
      2},
     {"collide", KEY_COLLIDE, "point|pearl|segment", 0,
      "What is kept out of head and torso: nodes, nodes as small spheres (default), or those and "
