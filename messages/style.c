@@ -18,6 +18,7 @@ typedef struct Cursor {
     uint8_t* out;
     const uint8_t* in;
     size_t at, size;
+    uint32_t format; // of the style in transit; a written one is STYLE_FORMAT
     bool passed_end;
 } Cursor;
 
@@ -84,7 +85,7 @@ static void carry_fixed(Cursor* cursor, Hairstyle* style)
     carry_int(cursor, &style->set_count);
     carry_int(cursor, &style->triangle_count);
     carry_int(cursor, &style->collider_count);
-    carry_int(cursor, &style->hold_count);
+    if (cursor->format >= 2) carry_int(cursor, &style->hold_count);
     carry_int(cursor, &style->head_kind);
     carry_bytes(cursor, &style->offset_scale_m, 4);
     carry_vec3(cursor, &style->material.root_colour);
@@ -113,17 +114,25 @@ static void carry_set(Cursor* cursor, StrandSet* set)
     carry_bytes(cursor, &set->jitter_m, 4);
 }
 
+// A collider of format 1 was a sphere of the head: a capsule whose ends are one point.
+static void carry_collider(Cursor* cursor, Collider* collider)
+{
+    carry_vec3(cursor, &collider->from);
+    if (cursor->format >= 2)
+        carry_vec3(cursor, &collider->to);
+    else
+        collider->to = collider->from;
+    carry_bytes(cursor, &collider->radius, 4);
+    if (cursor->format >= 2) carry_int(cursor, &collider->body);
+}
+
 // Everything whose length the fixed part announced.
 static void carry_tables(Cursor* cursor, Hairstyle* style)
 {
     for (int i = 0; i < style->set_count; ++i)
         carry_set(cursor, &style->sets[i]);
-    for (int i = 0; i < style->collider_count; ++i) {
-        carry_vec3(cursor, &style->colliders[i].from);
-        carry_vec3(cursor, &style->colliders[i].to);
-        carry_bytes(cursor, &style->colliders[i].radius, 4);
-        carry_int(cursor, &style->colliders[i].body);
-    }
+    for (int i = 0; i < style->collider_count; ++i)
+        carry_collider(cursor, &style->colliders[i]);
     for (int i = 0; i < style->hold_count; ++i) {
         carry_int(cursor, &style->holds[i].kind);
         carry_int(cursor, &style->holds[i].first_guide);
@@ -154,9 +163,9 @@ static bool allocate_tables(Hairstyle* style, Fault* fault)
 static bool check_lead(const FastLead* lead, Fault* fault)
 {
     if (lead->magic != MAGIC) return fault_set(fault, "style: these bytes are not a style");
-    if (lead->format != STYLE_FORMAT)
-        return fault_set(fault, "style: format %u; this program reads format %d", lead->format,
-                         STYLE_FORMAT);
+    if (lead->format < STYLE_FORMAT_OLDEST || lead->format > STYLE_FORMAT)
+        return fault_set(fault, "style: format %u; this program reads formats %d to %d",
+                         lead->format, STYLE_FORMAT_OLDEST, STYLE_FORMAT);
     if (lead->bulk_size > STYLE_BULK_MAX_BYTES)
         return fault_set(fault, "style: a bulk lane of %u bytes; at most %d", lead->bulk_size,
                          STYLE_BULK_MAX_BYTES);
@@ -186,6 +195,7 @@ Hairstyle* style_decode_fast(const uint8_t* bytes, size_t size, size_t* bulk_siz
     FastLead lead = {0}; // stays zero where the bytes end first
     carry_lead(&cursor, &lead);
     if (!check_lead(&lead, fault)) return NULL;
+    cursor.format = lead.format;
     Hairstyle* style = hairstyle_create();
     if (style == NULL) {
         fault_set(fault, "style: no memory");
@@ -206,7 +216,7 @@ static bool encode_fast(StyleBytes* bytes, const Hairstyle* style, Fault* fault)
     if (lane == NULL) return fault_set(fault, "style: no memory");
     FastLead lead = {MAGIC, STYLE_FORMAT, (uint32_t)bytes->size[STYLE_BULK],
                      style_hash(bytes->lane[STYLE_BULK], bytes->size[STYLE_BULK])};
-    Cursor cursor = {.out = lane, .size = STYLE_FAST_MAX_BYTES};
+    Cursor cursor = {.out = lane, .size = STYLE_FAST_MAX_BYTES, .format = STYLE_FORMAT};
     // carry_* writes through its pointer only when reading or to pad a name with zeros, and both
     // leave a copy's arrays as they are.
     Hairstyle copy = *style;

@@ -97,9 +97,9 @@ bool style_part_decode(StylePart* part, const uint8_t* bytes, size_t size, Fault
         return fault_set(fault, "style part: %zu bytes", size);
     if (bytes_get_be64(bytes + AT_FINGERPRINT) != fingerprint())
         return fault_set(fault, "style part: another type or version of message");
-    if (bytes[AT_FORMAT] != STYLE_FORMAT)
-        return fault_set(fault, "style part: format %d; this program reads format %d",
-                         bytes[AT_FORMAT], STYLE_FORMAT);
+    if (bytes[AT_FORMAT] < STYLE_FORMAT_OLDEST || bytes[AT_FORMAT] > STYLE_FORMAT)
+        return fault_set(fault, "style part: format %d; this program reads formats %d to %d",
+                         bytes[AT_FORMAT], STYLE_FORMAT_OLDEST, STYLE_FORMAT);
     if (bytes_get_be16(bytes + AT_RESERVED) != 0)
         return fault_set(fault, "style part: its reserved field is %d; it must be 0",
                          bytes_get_be16(bytes + AT_RESERVED));

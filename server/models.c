@@ -4,8 +4,8 @@
 
 #include <string.h>
 
-// Of springs to rest places, 1600 1/s^2 falling with the square of 25 L leaves 33 at the tip of a
-// strand of 28 cm, about what gravity gives a pendulum of that length, and 16 at 40 cm. A chain of
+// Of springs to rest places, 1600 1/s^2 falling with the square of 16 L leaves 80 at the tip of a
+// strand of 28 cm, twice what gravity gives a pendulum of that length, and 39 at 40 cm. A chain of
 // joints is a rod, the same all along: 12,000 is Gamma = 7 at 28 cm, and five sixths of what the
 // cascade is stable to at 240 steps a second. With the springs' values its tips buckled under their
 // own weight and came back another way each time (tests/test_clips.c).

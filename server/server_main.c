@@ -106,8 +106,7 @@ static const struct argp_option option_table[] = {
     {"iterations", KEY_ITERATIONS, "N", 0, "Length corrections of a substep (1)", 2},
     {"length", KEY_LENGTH, "sweeps|direct", 0,
      "sweeps (default of spring): links corrected one after another; direct (of cascade and "
-     "plain): "
-     "all at once, for the price of two sweeps",
+     "plain): all at once, for the price of two sweeps and with less stretch left",
      2},
     {"collide", KEY_COLLIDE, "point|pearl|segment", 0,
      "What is kept out of head and torso: nodes, nodes as small spheres (default), or those and "

@@ -99,7 +99,7 @@ static double law_away(const Law* law, double tilt)
 static SimDefinition defaults(ModelKind model)
 {
     SimDefinition d = sim_default();
-    d.model = model;
+    model_use(&d, model);
     d.strands = 1;
     d.nodes = LINKS + 1;
     return d;

@@ -150,6 +150,7 @@ static void shares_of(int fall_off, double* share)
 {
     SimDefinition d = sim_default();
     d.stiffness_s2 = 1;
+    d.fall_off_per_m = TRIAL_FALL_OFF;
     d.fall_off_power = fall_off;
     for (int i = 0; i < LINKS; ++i)
         share[i] = (double)model_stiffness(&d, (float)(TRIAL_LENGTH_M * i / LINKS));

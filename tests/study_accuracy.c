@@ -10,36 +10,48 @@
 #include <math.h>
 #include <stdio.h>
 
-#define GAMMA            22.0 // of the groom that models are compared with themselves on
-#define LINKS            7
-#define RATES            5
-#define SWEEPS           5
-#define TRUTH_SUBSTEPS   256
-#define TRUTH_ITERATIONS 40
-#define ROD_LINKS        42
-#define ROD_STEPS        12 // a tick
-#define MODEL_SUBSTEPS   64 // ... of a model that is compared with it, converged
-#define MODEL_ITERATIONS 8
-#define CHAIN_LINKS      42
-#define CHAOS            3.0 // of what the truth itself is unsure of: an error within says nothing
-#define COST_STRANDS     121
-#define COST_ROUNDS      25
-#define COST_PIECE       5  // ticks, timed together
-#define COST_REPEATS     4  // ... so often
-#define MOST_RATE        16 // of rates[]
-#define COST_TICKS       60
-#define FIRST_MODE       12.362        // 3.516^2: first mode of a clamped beam
-#define MISSING          ((double)NAN) // printed as nothing
-#define FIRST_SWING      1.4458        // 1.2024^2: of a hanging chain
+#define GAMMA          22.0 // of the groom that models are compared with themselves on
+#define LINKS          7
+#define RATES          5
+#define STAGES         8
+#define TRUTH_SUBSTEPS 256
+#define TRUTH_SOLVES   4
+#define TRUTH_SWEEPS   40 // of a model that only ever sweeps
+#define ROD_LINKS      42
+#define ROD_STEPS      12 // a tick
+#define MODEL_SUBSTEPS 64 // ... of a model that is compared with it, converged
+#define MODEL_SOLVES   4
+#define MODEL_SWEEPS   8
+#define CHAIN_LINKS    42
+#define CHAOS          3.0 // of what the truth itself is unsure of: an error within says nothing
+#define COST_STRANDS   121
+#define COST_ROUNDS    25
+#define COST_PIECE     5  // ticks, timed together
+#define COST_REPEATS   4  // ... so often
+#define MOST_RATE      16 // of rates[]
+#define COST_TICKS     60
+#define FIRST_MODE     12.362        // 3.516^2: first mode of a clamped beam
+#define MISSING        ((double)NAN) // printed as nothing
+#define FIRST_SWING    1.4458        // 1.2024^2: of a hanging chain
 
 static const int rates[RATES] = {1, 2, 4, 8, 16}; // substeps of a tick
-static const int sweeps[SWEEPS] = {1, 2, 4, 8, 16};
+
+// How lengths are kept within a substep.
+typedef struct Stage {
+    LengthStage length;
+    int iterations;
+} Stage;
+
+static const Stage stages[STAGES] = {
+    {LENGTH_SWEEPS, 1},  {LENGTH_SWEEPS, 2}, {LENGTH_SWEEPS, 4}, {LENGTH_SWEEPS, 8},
+    {LENGTH_SWEEPS, 16}, {LENGTH_DIRECT, 1}, {LENGTH_DIRECT, 2}, {LENGTH_DIRECT, 4},
+};
 static const float dampings[] = {15.0f, 8.0f};
 #define DAMPINGS (sizeof dampings / sizeof dampings[0])
 
 typedef struct Bench {
     Groom groom;
-    double us[MODEL_COUNT][RATES][SWEEPS]; // of a tick of COST_STRANDS
+    double us[MODEL_COUNT][RATES][STAGES]; // of a tick of COST_STRANDS
     Trace truth, other, trace;
 } Bench;
 
@@ -48,6 +60,7 @@ typedef struct Row {
     const char *set, *model, *variant, *clip;
     double gamma, damping;
     int substeps, iterations;
+    LengthStage length;
     Distance distance;
     Conduct conduct;
     double truth_rms, spread, us, energy, stable_to_s2;
@@ -92,7 +105,7 @@ static void print(const Row* row)
     number(1e3 * row->us / (COST_STRANDS * (LINKS + 1) * row->substeps));
     number(row->energy);
     number(row->stable_to_s2);
-    printf("\n");
+    printf(",%s\n", row->iterations > 0 ? length_names[row->length] : "");
 }
 
 static void print_head(void)
@@ -102,16 +115,20 @@ static void print_head(void)
     printf("# eight strands of %.2f m, four that hang and four that arch, %d links; no colliders, "
            "the rod has none\n",
            GROOM_LENGTH_M, LINKS);
-    printf("# set numerical: against the same model in double at %d substeps of 1/60 s and %d "
-           "iterations; stiffness, fall-off, compensation as by default; groom of gamma %g\n",
-           TRUTH_SUBSTEPS, TRUTH_ITERATIONS, GAMMA);
+    printf(
+        "# set numerical: against the same model in double at %d substeps of 1/60 s and %d direct "
+        "solves of lengths (cascade-thesis: %d sweeps); stiffness, fall-off, compensation as by "
+        "default of the model; groom of gamma %g\n",
+        TRUTH_SUBSTEPS, TRUTH_SOLVES, TRUTH_SWEEPS, GAMMA);
+    printf("# set truth: spring's truth by %d sweeps against that by %d direct solves\n",
+           TRUTH_SWEEPS, TRUTH_SOLVES);
     printf("# set rod: against a discrete elastic rod of %d edges (G J = E I / 1.38, BDF2, %d "
            "steps of 1/60 s), straight by nature, whose rest under gravity is the groom; gamma is "
            "rho A g L^3 / (E I); k uniform, E I / (m d^3)\n",
            ROD_LINKS, ROD_STEPS);
-    printf("#   variant converged: in double, %d substeps and %d iterations, so that the model's "
-           "own error is left; shipped: in float, at the rate of the row\n",
-           MODEL_SUBSTEPS, MODEL_ITERATIONS);
+    printf("#   variant converged: in double, %d substeps and %d direct solves (cascade-thesis: %d "
+           "sweeps), so that the model's own error is left; shipped: in float, as by default\n",
+           MODEL_SUBSTEPS, MODEL_SOLVES, MODEL_SWEEPS);
     printf("#   spring, beam: k/m = 12.36 g / (L gamma), first mode of a beam; hang: 1.446 g / L "
            "more, that of a hanging chain; default: k and fall-off as shipped\n"
            "#   forest, forest-z: the head's acceleration acts on every link, or on the outermost "
@@ -134,16 +151,51 @@ static void print_head(void)
     printf("set,model,variant,gamma,damping_per_s,clip,rate_hz,iterations,rms_l,raw_rms_l,max_l,"
            "motion_rms_l,tip_lag_ms,stretch_mean_pct,stretch_max_pct,projection_mean_mm,"
            "projection_max_mm,rest_error_l,tip_peak_l,truth_rms_l,spread_l,chaos,lost,us_per_tick,"
-           "ns_per_node_step,energy_drift_pct_s,stable_to_s2\n");
+           "ns_per_node_step,energy_drift_pct_s,stable_to_s2,length\n");
 }
 
 static SimDefinition defaults(ModelKind model, double damping)
 {
     SimDefinition d = sim_default();
-    d.model = model;
+    model_use(&d, model);
     d.damping_per_s = (float)damping;
     d.force = true; // 60 Hz is beyond the bound of some: that is an error, too
     return d;
+}
+
+static bool has_lengths(ModelKind model)
+{
+    return model != MODEL_FOREST && model != MODEL_FOREST_Z;
+}
+
+// The printed cascade is as printed: it sweeps. What has no lengths to keep has one stage.
+static bool has_stage(ModelKind model, int stage)
+{
+    if (!has_lengths(model)) return stage == 0;
+    return model != MODEL_CASCADE_THESIS || stages[stage].length == LENGTH_SWEEPS;
+}
+
+static void use_stage(SimDefinition* d, int stage)
+{
+    d->length = stages[stage].length;
+    d->iterations = has_lengths(d->model) ? stages[stage].iterations : 0;
+}
+
+// One iteration of the model's own.
+static int stage_by_default(ModelKind model)
+{
+    int i = 0;
+    while (has_lengths(model) && (stages[i].length != models[model].length))
+        ++i;
+    return i;
+}
+
+static void use_converged(SimDefinition* d, int substeps, int solves, int many_sweeps)
+{
+    bool is_printed = d->model == MODEL_CASCADE_THESIS;
+    d->substeps = substeps;
+    d->length = is_printed ? LENGTH_SWEEPS : LENGTH_DIRECT;
+    d->iterations = is_printed ? many_sweeps : has_lengths(d->model) ? solves : 0;
 }
 
 // --- cost
@@ -165,7 +217,7 @@ static Sim* create_cost(const Groom* groom, SimDefinition d, Fault* fault)
 }
 
 typedef struct Costs {
-    Sim* sims[MODEL_COUNT][RATES][SWEEPS];
+    Sim* sims[MODEL_COUNT][RATES][STAGES];
     SimHead heads[RATES][COST_TICKS][MOST_RATE];
 } Costs;
 
@@ -178,10 +230,11 @@ static bool create_costs(Costs* costs, const Groom* groom, Fault* fault)
     }
     for (int model = 0; model < MODEL_COUNT; ++model)
         for (int r = 0; r < RATES; ++r)
-            for (int i = 0; i < SWEEPS; ++i) {
+            for (int i = 0; i < STAGES; ++i) {
+                if (!has_stage((ModelKind)model, i)) continue;
                 SimDefinition d = defaults((ModelKind)model, 8.0);
                 d.substeps = rates[r];
-                d.iterations = sweeps[i];
+                use_stage(&d, i);
                 costs->sims[model][r][i] = create_cost(groom, d, fault);
                 if (costs->sims[model][r][i] == NULL) return false;
             }
@@ -209,7 +262,8 @@ static void time_costs(Bench* bench, Costs* costs)
     for (int round = 0; round < COST_ROUNDS; ++round)
         for (int model = 0; model < MODEL_COUNT; ++model)
             for (int r = 0; r < RATES; ++r)
-                for (int i = 0; i < SWEEPS; ++i) {
+                for (int i = 0; i < STAGES; ++i) {
+                    if (!has_stage((ModelKind)model, i)) continue;
                     double us = time_us(costs->sims[model][r][i], costs->heads[r]);
                     double* least = &bench->us[model][r][i];
                     *least = round == 0 ? us : fmin(*least, us);
@@ -224,14 +278,9 @@ static bool measure_cost(Bench* bench, Fault* fault)
     if (done) time_costs(bench, &costs);
     for (int model = 0; model < MODEL_COUNT; ++model)
         for (int r = 0; r < RATES; ++r)
-            for (int i = 0; i < SWEEPS; ++i)
+            for (int i = 0; i < STAGES; ++i)
                 sim_destroy(costs.sims[model][r][i]);
     return done;
-}
-
-static bool has_sweeps(ModelKind model)
-{
-    return model != MODEL_FOREST && model != MODEL_FOREST_Z;
 }
 
 // --- against itself, converged
@@ -239,8 +288,7 @@ static bool has_sweeps(ModelKind model)
 static bool find_truth(Bench* bench, SimDefinition d, const Clip* clip, double* halving,
                        Fault* fault)
 {
-    d.substeps = TRUTH_SUBSTEPS;
-    d.iterations = TRUTH_ITERATIONS;
+    use_converged(&d, TRUTH_SUBSTEPS, TRUTH_SOLVES, TRUTH_SWEEPS);
     if (!trace_simulate(&bench->truth, &solver_double, d, LINKS, TRACE_COPIES, &bench->groom, clip,
                         fault))
         return false;
@@ -259,6 +307,7 @@ static bool compare(Bench* bench, SimDefinition d, const Clip* clip, Row row, Fa
     row.clip = clip->name;
     row.substeps = d.substeps;
     row.iterations = d.iterations;
+    row.length = d.length;
     row.damping = (double)d.damping_per_s;
     row.stable_to_s2 = model_stiffness_bound(&d);
     row.distance = trace_distance(&bench->trace, &bench->truth, 1, clip);
@@ -268,13 +317,15 @@ static bool compare(Bench* bench, SimDefinition d, const Clip* clip, Row row, Fa
     return true;
 }
 
-// Every number of sweeps where the study is about them: for others, and at the damping that is not
-// for comparing, one and four.
-static bool is_wanted(ModelKind model, double damping, int iterations)
+// Every stage where the study is about them: for others, and at the damping that is not for
+// comparing, one and four sweeps and one and two solves.
+static bool is_wanted(ModelKind model, double damping, int stage)
 {
-    if (!has_sweeps(model)) return iterations == 1;
+    const Stage* s = &stages[stage];
+    if (!has_stage(model, stage)) return false;
     if (model == MODEL_SPRING && damping > 10.0) return true;
-    return iterations == 1 || iterations == 4 || (iterations == 16 && damping > 10.0);
+    if (s->length == LENGTH_DIRECT) return s->iterations <= 2;
+    return s->iterations == 1 || s->iterations == 4 || (s->iterations == 16 && damping > 10.0);
 }
 
 static bool study_numerical(Bench* bench, ModelKind model, double damping, const Clip* clip,
@@ -285,10 +336,10 @@ static bool study_numerical(Bench* bench, ModelKind model, double damping, const
     if (!find_truth(bench, d, clip, &row.truth_rms, fault)) return false;
     row.spread = trace_spread(&bench->truth);
     for (int r = 0; r < RATES; ++r)
-        for (int i = 0; i < SWEEPS; ++i) {
-            if (!is_wanted(model, damping, sweeps[i])) continue;
+        for (int i = 0; i < STAGES; ++i) {
+            if (!is_wanted(model, damping, i)) continue;
             d.substeps = rates[r];
-            d.iterations = sweeps[i];
+            use_stage(&d, i);
             row.us = bench->us[model][r][i];
             if (!compare(bench, d, clip, row, fault)) return false;
         }
@@ -305,6 +356,35 @@ static bool study_all_numerical(Bench* bench, Fault* fault)
                 if (!study_numerical(bench, (ModelKind)model, (double)dampings[i], clip, fault))
                     return false;
             }
+    return true;
+}
+
+// Does the truth depend on how its lengths are kept?
+static bool study_truth(Bench* bench, Fault* fault)
+{
+    for (const Clip* clip = clips; clip->name != NULL; ++clip) {
+        SimDefinition d = defaults(MODEL_SPRING, (double)dampings[0]);
+        Row row = {.set = "truth",
+                   .model = models[d.model].name,
+                   .variant = "sweeps to solves",
+                   .gamma = MISSING,
+                   .us = MISSING,
+                   .energy = MISSING};
+        fprintf(stderr, "accuracy: truth, %s\n", clip->name);
+        if (!find_truth(bench, d, clip, &row.truth_rms, fault)) return false;
+        row.spread = trace_spread(&bench->truth);
+        d.substeps = row.substeps = TRUTH_SUBSTEPS;
+        d.iterations = row.iterations = TRUTH_SWEEPS;
+        if (!trace_simulate(&bench->trace, &solver_double, d, LINKS, 1, &bench->groom, clip, fault))
+            return false;
+        row.clip = clip->name;
+        row.damping = (double)d.damping_per_s;
+        row.length = d.length;
+        row.distance = trace_distance(&bench->trace, &bench->truth, 1, clip);
+        row.conduct = trace_conduct(&bench->trace, &bench->groom, clip);
+        row.stable_to_s2 = model_stiffness_bound(&d);
+        print(&row);
+    }
     return true;
 }
 
@@ -344,10 +424,8 @@ static SimDefinition stand_for(const Contender* one, double gamma, double dampin
     double unit = GROOM_GRAVITY / GROOM_LENGTH_M;
     bool is_spring = one->model == MODEL_SPRING;
     d.outermost = one->outermost;
-    if (one->is_converged) {
-        d.substeps = MODEL_SUBSTEPS;
-        d.iterations = MODEL_ITERATIONS;
-    }
+    if (one->is_converged) use_converged(&d, MODEL_SUBSTEPS, MODEL_SOLVES, MODEL_SWEEPS);
+    if (!has_lengths(d.model)) d.iterations = 0;
     if (is_spring && one->beam == 0.0) return d;
     d.fall_off_power = 0;
     d.stiffness_s2 =
@@ -371,11 +449,12 @@ static bool contend(Bench* bench, const Contender* one, double damping, const Cl
                .damping = damping,
                .substeps = d.substeps,
                .iterations = d.iterations,
+               .length = d.length,
                .distance = trace_distance(&bench->trace, &bench->truth, 1, clip),
                .conduct = trace_conduct(&bench->trace, &bench->groom, clip),
                .truth_rms = truth_rms,
                .spread = MISSING,
-               .us = one->is_converged ? MISSING : bench->us[d.model][2][0],
+               .us = one->is_converged ? MISSING : bench->us[d.model][2][stage_by_default(d.model)],
                .energy = MISSING,
                .stable_to_s2 = model_stiffness_bound(&d),
                .lost = bench->trace.lost};
@@ -435,8 +514,7 @@ static bool study_all_rods(Bench* bench, Fault* fault)
 static bool study_chain(Bench* bench, double damping, const Clip* clip, Fault* fault)
 {
     SimDefinition d = defaults(MODEL_PLAIN, damping);
-    d.substeps = MODEL_SUBSTEPS;
-    d.iterations = MODEL_ITERATIONS;
+    use_converged(&d, MODEL_SUBSTEPS, MODEL_SOLVES, MODEL_SWEEPS);
     if (!trace_simulate(&bench->truth, &solver_double, d, CHAIN_LINKS, 1, &bench->groom, clip,
                         fault) ||
         !trace_simulate(&bench->trace, &solver_double, d, LINKS, 1, &bench->groom, clip, fault))
@@ -449,6 +527,7 @@ static bool study_chain(Bench* bench, double damping, const Clip* clip, Fault* f
                .damping = damping,
                .substeps = d.substeps,
                .iterations = d.iterations,
+               .length = d.length,
                .distance = trace_distance(&bench->trace, &bench->truth, CHAIN_LINKS / LINKS, clip),
                .truth_rms = MISSING,
                .spread = MISSING,
@@ -482,14 +561,16 @@ static bool study_energy(Bench* bench, Fault* fault)
                .spread = MISSING};
     for (int model = 0; model < MODEL_CASCADE_THESIS; ++model)
         for (int r = 0; r < RATES; ++r)
-            for (int i = 0; i < SWEEPS; ++i) {
+            for (int i = 0; i < STAGES; ++i) {
+                if (!has_stage((ModelKind)model, i)) continue;
                 SimDefinition d = defaults((ModelKind)model, 0.0);
                 d.substeps = row.substeps = rates[r];
-                d.iterations = row.iterations = sweeps[i];
+                use_stage(&d, i);
+                row.iterations = d.iterations;
+                row.length = d.length;
                 row.stable_to_s2 = model_stiffness_bound(&d);
                 row.model = models[model].name;
                 row.us = bench->us[model][r][i];
-                if (!has_sweeps(d.model) && i > 0) continue;
                 if (!energy_drift(d, &row.energy, &row.lost, fault)) return false;
                 row.energy *= 100.0;
                 print(&row);
@@ -503,8 +584,8 @@ bool study_accuracy(Fault* fault)
     if (!groom_make(&bench.groom, GAMMA, fault)) return false;
     print_head();
     bool done = measure_cost(&bench, fault) && study_energy(&bench, fault) &&
-                study_all_chains(&bench, fault) && study_all_numerical(&bench, fault) &&
-                study_all_rods(&bench, fault);
+                study_all_chains(&bench, fault) && study_truth(&bench, fault) &&
+                study_all_numerical(&bench, fault) && study_all_rods(&bench, fault);
     trace_free(&bench.truth);
     trace_free(&bench.other);
     trace_free(&bench.trace);

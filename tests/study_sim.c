@@ -1,4 +1,4 @@
-// What a tick costs: over models, kernels, strands, nodes, iterations, threads, and what colliders
+// What a tick costs: over models, kernels, strands, nodes, lengths, threads, and what colliders
 // and wind add. Every set of cases is measured in rounds, all of its cases in each, so that a busy
 // minute falls on all alike and their ratios stand. Times are of the thread, so that what else runs
 // here counts as little as may be; of the clock where there are several.
@@ -28,6 +28,7 @@ typedef struct Case {
     const char* kernel;
     int nodes, strands, substeps, iterations, threads, colliders;
     float wind_m_s;
+    LengthStage length;
     Sim* sim;
     int64_t ticks;     // of a round
     double us[ROUNDS]; // of a tick
@@ -83,7 +84,8 @@ static Sim* create(const Case* one, Fault* fault)
     for (int k = 0; k < SPHERES; ++k)
         spheres[k] =
             collider_sphere((Sphere){{0.02f * (float)k, -0.02f * (float)k, -0.09f}, 0.08f});
-    d.model = one->model;
+    model_use(&d, one->model);
+    d.length = one->length;
     d.kernel = one->kernel;
     d.strands = one->strands;
     d.nodes = one->nodes;
@@ -93,7 +95,9 @@ static Sim* create(const Case* one, Fault* fault)
     d.threads = one->threads;
     d.colliders = spheres;
     d.collider_count = one->colliders;
-    d.force = true; // one substep of the cascade is near its bound
+    d.force = true; // forest-z: one substep is beyond the bound of its joints' damping
+    // One substep is beyond the stiffness of joints, too, and what flies apart takes another time.
+    d.stiffness_s2 = fminf(d.stiffness_s2, (float)(0.5 * model_stiffness_bound(&d)));
     Sim* sim = sim_create(&d, fault);
     free(rest);
     return sim;
@@ -133,10 +137,11 @@ static double ns_per_node_step(const Case* one, int rank)
 
 static void print(const Case* one)
 {
-    printf("%s,%s,%s,%d,%d,%d,%d,%d,%d,%g,%.4g,%.4g,%.4g,%.4g\n", one->set, models[one->model].name,
-           one->kernel, one->nodes, one->strands, one->substeps, one->iterations, one->threads,
-           one->colliders, (double)one->wind_m_s, ns_per_node_step(one, 0),
-           ns_per_node_step(one, ROUNDS / 2), one->us[0], one->us[ROUNDS / 2]);
+    printf("%s,%s,%s,%d,%d,%d,%d,%d,%d,%g,%.4g,%.4g,%.4g,%.4g,%s\n", one->set,
+           models[one->model].name, one->kernel, one->nodes, one->strands, one->substeps,
+           one->iterations, one->threads, one->colliders, (double)one->wind_m_s,
+           ns_per_node_step(one, 0), ns_per_node_step(one, ROUNDS / 2), one->us[0],
+           one->us[ROUNDS / 2], length_names[one->length]);
 }
 
 static bool measure(Cases* cases, Fault* fault)
@@ -169,6 +174,7 @@ static Case* add(Cases* cases, const char* set, ModelKind model)
     Case* one = &cases->all[cases->count++];
     *one = (Case){.set = set,
                   .model = model,
+                  .length = models[model].length,
                   .kernel = kernel_find(NULL)->name,
                   .nodes = 8,
                   .strands = 1024,
@@ -185,6 +191,7 @@ static void add_gates(Cases* cases)
         for (int i = 0; i < 4; ++i) {
             Case* one = add(cases, "gate", kinds[i]);
             one->iterations = sweeps;
+            one->length = LENGTH_SWEEPS;
             one->substeps = sweeps == 4 ? 1 : 4;
             if (i == 0) one->kernel = "scalar";
         }
@@ -220,6 +227,7 @@ static void add_kernels(Cases* cases)
             one->kernel = names[i];
             one->substeps = 1;
             one->iterations = 4;
+            one->length = LENGTH_SWEEPS;
         }
 }
 
@@ -253,7 +261,11 @@ static void add_iterations(Cases* cases)
 {
     static const int iterations[] = {0, 1, 2, 4, 8, 16};
     for (size_t i = 0; i < sizeof iterations / sizeof iterations[0]; ++i)
-        add(cases, "iterations", MODEL_SPRING)->iterations = iterations[i];
+        for (int length = 0; length < LENGTH_COUNT; ++length) {
+            Case* one = add(cases, "iterations", MODEL_SPRING);
+            one->iterations = iterations[i];
+            one->length = (LengthStage)length;
+        }
 }
 
 static void add_threads(Cases* cases)
@@ -278,11 +290,14 @@ static void add_prices(Cases* cases)
 bool study_sim(Fault* fault)
 {
     static Cases cases; // large
-    printf("# hair-bench sim: time of a tick; the head sways, strands of 0.25 m, %d rounds\n",
+    printf("# hair-bench sim: time of a tick; the head sways, strands of 0.25 m, %d rounds; "
+           "stiffness and length stage as the model has them by default, sets gate and kernels by "
+           "sweeps\n",
            ROUNDS);
     study_machine();
-    printf("set,model,kernel,nodes,strands,substeps,iterations,threads,colliders,wind_m_s,"
-           "ns_per_node_step_min,ns_per_node_step_median,us_per_tick_min,us_per_tick_median\n");
+    printf(
+        "set,model,kernel,nodes,strands,substeps,iterations,threads,colliders,wind_m_s,"
+        "ns_per_node_step_min,ns_per_node_step_median,us_per_tick_min,us_per_tick_median,length\n");
     add_gates(&cases);
     if (!measure(&cases, fault)) return false;
     print_gates(&cases);

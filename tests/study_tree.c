@@ -107,7 +107,7 @@ static bool create(Run* run, const Case* one, Fault* fault)
     SimDefinition d = sim_default();
     TreeOptions options = options_of(one);
     grow(run->rest, one->strands);
-    d.model = one->model;
+    model_use(&d, one->model);
     d.strands = one->strands;
     d.nodes = NODES;
     d.rest = run->rest;

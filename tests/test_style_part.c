@@ -88,11 +88,27 @@ static void style_part_decode_rejects_every_wrong_field(void** state)
 {
     (void)state;
     static const WrongField wrong[] = {
-        {0, 8, 5},           {8, 8, UINT64_MAX}, {16, 8, 1ull << 63}, {32, 4, 0},
-        {32, 4, 0xffffffff}, {32, 4, 5u << 20},  {36, 4, 101},        {36, 4, 0xffffff9c},
-        {40, 2, 0},          {40, 2, 4},         {40, 2, 0xffff},     {42, 2, 0},
-        {42, 2, 2},          {42, 2, 0x8000},    {44, 1, 2},          {45, 1, 1},
-        {46, 2, 1},          {48, 4, 1},         {52, 4, 99},         {52, 4, 0xffffffff},
+        {0, 8, 5},
+        {8, 8, UINT64_MAX},
+        {16, 8, 1ull << 63},
+        {32, 4, 0},
+        {32, 4, 0xffffffff},
+        {32, 4, 5u << 20},
+        {36, 4, 101},
+        {36, 4, 0xffffff9c},
+        {40, 2, 0},
+        {40, 2, 4},
+        {40, 2, 0xffff},
+        {42, 2, 0},
+        {42, 2, 2},
+        {42, 2, 0x8000},
+        {44, 1, 2},
+        {45, 1, 0},
+        {45, 1, STYLE_FORMAT + 1},
+        {46, 2, 1},
+        {48, 4, 1},
+        {52, 4, 99},
+        {52, 4, 0xffffffff},
     };
     uint8_t payload[100] = {1, 2, 3}, bytes[200];
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {

@@ -13,11 +13,14 @@ SimDefinition trial_bare(ModelKind model, int links)
 {
     SimDefinition d = sim_default();
     d.model = model;
+    d.length = LENGTH_SWEEPS;
     d.strands = 1;
     d.nodes = links + 1;
     d.substeps = 1;
     d.gravity_m_s2 = 0;
     d.gravity_compensation = false;
+    d.stiffness_s2 = 0;
+    d.fall_off_per_m = TRIAL_FALL_OFF;
     d.fall_off_power = 0;
     d.damping_per_s = 0;
     d.iterations = 1;

@@ -10,6 +10,7 @@
 
 #define TRIAL_LINKS    32
 #define TRIAL_LENGTH_M 0.28
+#define TRIAL_FALL_OFF 16.0f // 1/m, where stiffness falls off at all
 #define TRIAL_GRAVITY  9.81
 #define TRIAL_SUBSTEPS 64
 #define TRIAL_S        10.0
@@ -28,8 +29,9 @@ typedef struct Trial {
     Vec3 now[TRIAL_LINKS + 1], before[TRIAL_LINKS + 1];
 } Trial;
 
-// Links of 4 cm make up 28 cm where there are 7; no gravity, no damping, no fall-off, one substep
-// of 1/60 s, one sweep of length correction; bounds are passed by force.
+// Links of 4 cm make up 28 cm where there are 7; no gravity, no stiffness, no damping, no fall-off,
+// one substep of 1/60 s, one sweep of length correction whatever the model has by default; bounds
+// are passed by force.
 SimDefinition trial_bare(ModelKind model, int links);
 
 // The damping that leaves `kept` of a velocity after a step of 1/60 s.

@@ -1,5 +1,5 @@
 # What a tick costs, over how many strands: scripts/chart --measure sim cost.
-set title "A tick of 8 nodes a strand, 4 substeps of one sweep of lengths, one thread"
+set title "A tick of 8 nodes a strand, 4 substeps, each model as by default, one thread"
 set xlabel "strands"
 set ylabel "{/Symbol m}s a tick"
 set logscale xy

@@ -1,8 +1,8 @@
 # Map K: links between nodes that are kept out of a sphere.
 load "maps.gp"
 set terminal pngcairo size 1280,480
-set multiplot layout 1,3 title "Kept out by their nodes, links cut into a sphere with the square of their length;\na pearl hides it up to where the chord comes through, links that collide themselves do not cut" \
-    margins 0.065,0.86,0.14,0.8 spacing 0.06
+set multiplot layout 1,3 title "Kept out by their nodes, links cut into a sphere with the square of their length;\na pearl hides it up to where the chord comes through, links that collide themselves cut only where long and thin" \
+    margins 0.065,0.85,0.14,0.8 spacing 0.06
 set xrange [log10(0.05):log10(2)]
 set xtics ("0.05" log10(0.05), "0.1" -1, "0.2" log10(0.2), "0.5" log10(0.5), "1" 0, "2" log10(2))
 set xlabel "length of a link, radii of the sphere"
@@ -20,8 +20,8 @@ set yrange [0:0.4]
 set ytics 0.1
 set ylabel "radius of a pearl, radii of the sphere"
 set title "pearls"
-set key at screen 0.865, screen 0.8 left top
-plot sample [t=0:0.4] "+" using (log10(2 * sqrt((1 + $1)**2 - 0.999**2))):1 with lines lw 2 lc rgb BOUND title "derived: the chord", \
+set key at screen 0.853, screen 0.8 left top
+plot sample [t=0:0.4] "+" using (log10(2 * sqrt((1 + $1)**2 - 0.999**2))):1 with lines lw 2 lc rgb BOUND title "the chord, derived", \
     bins("K", "pearl") using (log10($3)):4:(class(strcol(5))) with image, \
     [t=0:0.4] "+" using (log10(2 * sqrt((1 + $1)**2 - 0.999**2))):1 with lines lw 2 lc rgb BOUND, \
     edges("K", "pearl") using (log10($3)):4 with points pt 6 ps 0.8 lc rgb "#333333" title "measured", \

@@ -3,16 +3,16 @@ load "maps.gp"
 set terminal pngcairo size 900,520
 set grid linecolor rgb "#dddddd" linewidth 1 dashtype 1
 set border 3
-set title "Under a tilted head spring keeps its rest pose; cascade and forest hang, by their own laws"
+set title "Under a tilted head spring keeps its rest pose; cascade and forest hang, where their own laws put them"
 set xlabel "tilt of the head, degrees"
 set ylabel "farthest node from its rest place, lengths of the strand"
 set xrange [0:180]
 set xtics 30
-set yrange [-0.05:2.2]
-set key at graph 0.98, graph 0.12 right bottom
+set yrange [-0.03:1.1]
+set key inside top left
 # As printed, were there no links: the reference is displaced by m g / k fixed to the head, with k at the tip of the
-# defaults, 1600 / 7^2. By its formula; no program of ours does this.
-printed(x) = 2 * sin(0.5 * x * pi / 180) * 9.81 / (1600 / 49.0) / 0.28
+# defaults, 1600 / (16 * 0.28)^2. By its formula; no program of ours does this.
+printed(x) = 2 * sin(0.5 * x * pi / 180) * 9.81 / (1600 / (16 * 0.28)**2) / 0.28
 plot printed(x) with lines lw 2 dt 3 lc rgb SPRING title "spring as printed (4.4), by its formula", \
     law("H", "cascade") using 3:6 with lines lw 2 lc rgb BOUND title "equilibrium of the law", \
     law("H", "forest") using 3:6 with lines lw 2 lc rgb BOUND, \

@@ -6,7 +6,7 @@ system("awk -F, -v markdown=1 -f scorecard.awk accuracy.csv > scorecard.md")
 set datafile separator ";"
 CELLS = "< awk -F, -f scorecard.awk accuracy.csv"
 
-set title "Cascade is first wherever hair moves (3, 4, 5), forest at shape and length (1, 2), spring at price and stability\n{/*0.85 greener is better; in %: of the strand's length; µs and stretch as shipped (240 Hz, 1 iteration), criteria 3 to 5 against a rod of Γ = 10}" \
+set title "Cascade moves most like the rod (4, 5), forest is nearest rest (1), spring is cheapest and bears the stiffest k\n{/*0.85 greener is better; in %: of the strand's length; µs and stretch as shipped (240 Hz, 1 iteration), criteria 3 to 5 against a rod of Γ = 10}" \
     enhanced offset 0,0.3
 set key off
 unset border

@@ -5,8 +5,9 @@ set multiplot layout 3,1
 set logscale x 2
 set xrange [56:18000]
 set xtics ("64" 64, "256" 256, "512" 512, "1,024" 1024, "2,048" 2048, "4,096" 4096, "16,384" 16384)
-set lmargin 9
-set rmargin 36
+set lmargin at screen 0.085
+set rmargin at screen 0.66
+set key at screen 0.675, screen 0.95 left top Left reverse
 
 CLIPS = "shake nod run turn gust"
 COLOURS = "#1b6ca8 #c8553d #2e8b57 #7a6fac #e0a458"
@@ -15,7 +16,7 @@ state(s, contact) = rows("tree.csv", \
     "$1 == \"states\" && $5 == \"" . s . "\" && $7 == " . contact)
 colour(i) = word(COLOURS, i)
 
-set title "How much faster a tick is with the tree (spring, mean over 4 s)"
+set title "At 64 guides a tick is slower with the tree, from 1,024 on its mean is faster (spring)"
 set ylabel "times as fast"
 set logscale y
 set yrange [0.03:60]
@@ -36,7 +37,8 @@ plot for [i=1:words(CLIPS)] clip(word(CLIPS, i)) using 4:12 with linespoints poi
      1 with lines linecolor rgb "#000000" notitle
 unset label 1
 
-set title "The same and positions read out; dashed: the worst tick"
+set key at screen 0.675, screen 0.62 left top
+set title "With positions read out little of that is left; dashed: the worst tick of a clip"
 set yrange [0.3:30]
 plot for [i=1:words(CLIPS)] clip(word(CLIPS, i)) using 4:(($8+$14)/($10+$14)) with linespoints \
          pointtype 7 linecolor rgb colour(i) title word(CLIPS, i), \
@@ -44,7 +46,8 @@ plot for [i=1:words(CLIPS)] clip(word(CLIPS, i)) using 4:(($8+$14)/($10+$14)) wi
          dashtype 2 linecolor rgb colour(i) title word(CLIPS, i) . ", worst tick", \
      1 with lines linecolor rgb "#000000" notitle
 
-set title "RMS error of nodes; dashed: share of nodes split"
+set key at screen 0.675, screen 0.285 left top
+set title "RMS error of nodes against those without a tree; dashed: share of nodes split"
 set ylabel "% of length; % of nodes"
 set xlabel "strands"
 set yrange [0.1:110]
