@@ -329,6 +329,8 @@ static const Study studies[] = {
     {"stability", "where the models fail: boundaries measured and derived, eleven maps",
      study_stability},
     {"tree", "what the Adaptive Wisp Tree saves and what it gets wrong", study_tree},
+    {"reference", "our pictures against path-traced ones of the same strands (../shared/assets)",
+     study_reference},
 };
 #define STUDIES (sizeof studies / sizeof studies[0])
 
