@@ -312,11 +312,16 @@ static void parameters_are_read_by_name_and_wrong_ones_refused(void** state)
     }
 }
 
-// Light or eye along the strand, both, opposite, the same; every shading and norm.
+// Light or eye along the strand, both, opposite, the same, straight through; every shading and
+// norm.
 static void no_direction_makes_a_spike(void** state)
 {
     (void)state;
-    static const float directions[4][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0, 0.999999f, 1e-3f}};
+    static const float directions[][3] = {{0, 1, 0},         {0, -1, 0},
+                                          {1, 0, 0},         {0, 0.999999f, 1e-3f},
+                                          {0.5f, 0.866f, 0}, {-0.5f, -0.866f, 0}};
+    enum { DIRECTIONS = sizeof directions / sizeof directions[0] };
+    enum { COUNT = DIRECTIONS * DIRECTIONS };
     Gl* gl = open_any();
     for (int kind = 0; kind < SHADINGS; ++kind)
         for (int norm = 0; norm < NORMS; ++norm) {
@@ -324,13 +329,13 @@ static void no_direction_makes_a_spike(void** state)
             fibre.norm = (MarschnerNorm)norm;
             ShadingOptions options = shade_points_alone((ShadingKind)kind, &fibre);
             options.most = shading_default().most;
-            for (int i = 0; i < 16; ++i) {
+            for (int i = 0; i < COUNT; ++i) {
                 points[i] = (ShadePoint){.tangent = {0, 1, 0}};
-                memcpy(points[i].light, directions[i / 4], sizeof points[i].light);
-                memcpy(points[i].view, directions[i % 4], sizeof points[i].view);
+                memcpy(points[i].light, directions[i / DIRECTIONS], sizeof points[i].light);
+                memcpy(points[i].view, directions[i % DIRECTIONS], sizeof points[i].view);
             }
-            shade(gl, &options, NULL, 16);
-            for (int i = 0; i < 16; ++i)
+            shade(gl, &options, NULL, COUNT);
+            for (int i = 0; i < COUNT; ++i)
                 for (int c = 0; c < 3; ++c) {
                     float body = shaded[i].body[c], shine = shaded[i].shine[c];
                     assert_true(body >= 0.0f && body <= options.most && shine >= 0.0f &&
