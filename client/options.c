@@ -291,6 +291,7 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
     case KEY_MARSCHNER:
         if (!shading_parse(&shade->shading, value, &fault))
             argp_error(state, "--marschner %s: %s", value, fault.text);
+        options->has_marschner = true;
         break;
     case KEY_COLOUR:
         shade->colour = choice(state, "colour", value, shading_colour_names);
@@ -367,6 +368,8 @@ static void check(struct argp_state* state, const Options* options)
     if (options->motion != NULL && strcmp(options->motion, "bus") == 0)
         argp_error(state, "--motion bus: --embedded hears no bus; choose another motion");
     if (options->epoch != 0 && options->log == NULL) argp_error(state, "--epoch goes with --log");
+    if (options->has_marschner && options->shade.shading.kind != SHADING_MARSCHNER)
+        argp_error(state, "--marschner goes with --shading marschner");
     if (options->shade.transparency == TRANSPARENCY_HASH && options->shade.samples < 2)
         argp_error(state, "--transparency hash needs --msaa 2 or 4");
 }
