@@ -20,7 +20,7 @@ bool draw_create(Drawing* drawing, const Gl* gl, const ShadeOptions* options,
     drawing->fibres = fibres_create(gl, fault);
     if (drawing->times != NULL && drawing->fibres != 0 &&
         shadow_create(&drawing->shadow, gl, drawing->fibres, fault) &&
-        light_create(&drawing->light, gl, fault) &&
+        light_create(&drawing->light, gl, &options->shading, fault) &&
         shade_create(&drawing->shade, gl, options, fault))
         return true;
     draw_free(drawing);
@@ -50,6 +50,7 @@ bool draw_set_style(Drawing* drawing, const Hairstyle* style, uint64_t hash, int
         hair_free(&hair, drawing->gl);
         return false;
     }
+    if (drawing->options.has_colour) shading_colour(drawing->options.colour, &hair.material);
     hair_free(&drawing->hair, drawing->gl);
     drawing->hair = hair;
     drawing->style_hash = hash;

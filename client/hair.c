@@ -8,6 +8,7 @@ bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault)
 {
     memset(hair, 0, sizeof *hair);
     hair->style = style;
+    hair->material = style->material;
     if (!ribbons_build(&hair->ribbons, style, fault) ||
         !upload_create(&hair->guides, gl, style, fault) ||
         !update_create(&hair->update, gl, style, &hair->ribbons, fault) ||

@@ -6,6 +6,7 @@
 
 typedef struct Hair {
     const Hairstyle* style; // not owned
+    HairMaterial material;  // the style's, or another that was asked for
     Ribbons ribbons;
     GuideTextures guides;
     Update update;

@@ -4,11 +4,15 @@
 
 #include <string.h>
 
-bool light_create(Light* light, const Gl* gl, Fault* fault)
+bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, Fault* fault)
 {
     memset(light, 0, sizeof *light);
-    light->program = program_build(gl, "fullscreen.vert", "light.frag", NULL, fault);
+    char defines[SHADING_DEFINES_BYTES];
+    shading_defines(shading, defines);
+    if (!shading_create(&light->shading, gl, shading, fault)) return false;
+    light->program = program_build(gl, "fullscreen.vert", "light.frag", defines, fault);
     if (light->program == 0) return false;
+    shading_samplers(gl, light->program);
     hair_samplers(gl, light->program);
     shadow_samplers(gl, light->program);
     gl->GenVertexArrays(1, &light->vao);
@@ -18,6 +22,7 @@ bool light_create(Light* light, const Gl* gl, Fault* fault)
 
 void light_free(Light* light, const Gl* gl)
 {
+    shading_free(&light->shading, gl);
     gl->DeleteProgram(light->program);
     gl->DeleteVertexArrays(1, &light->vao);
     gl->DeleteFramebuffers(1, &light->framebuffer);
@@ -87,9 +92,10 @@ void light_show(const Light* light, const Gl* gl)
     gl->ActiveTexture(GL_TEXTURE0);
 }
 
-void light_run(const Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
+void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
                const Lights* lights, const Frame* frame)
 {
+    shading_update(&light->shading, gl, &hair->material);
     gl->BindFramebuffer(GL_FRAMEBUFFER, light->framebuffer);
     gl->Viewport(0, 0, UPDATE_WIDTH, light->rows);
     gl->Disable(GL_DEPTH_TEST);
@@ -97,10 +103,11 @@ void light_run(const Light* light, const Gl* gl, const Hair* hair, const Shadow*
     gl->UniformMatrix3fv(program_uniform(gl, light->program, "head_rotation"), 1, GL_TRUE,
                          frame->rotation);
     program_uniform3(gl, light->program, "eye", frame->camera.eye);
-    program_uniform3(gl, light->program, "root_colour", hair->style->material.root_colour);
-    program_uniform3(gl, light->program, "tip_colour", hair->style->material.tip_colour);
+    program_uniform3(gl, light->program, "root_colour", hair->material.root_colour);
+    program_uniform3(gl, light->program, "tip_colour", hair->material.tip_colour);
     lights_bind(lights, gl, light->program);
     shadow_bind(shadow, gl, light->program);
+    shading_bind(&light->shading, gl, light->program);
     for (GLenum i = 0; i < UPDATE_TARGETS; ++i) {
         gl->ActiveTexture(GL_TEXTURE0 + UNIT_POSITIONS + i);
         gl->BindTexture(GL_TEXTURE_2D, hair->update.targets[i]);

@@ -8,6 +8,7 @@
 #pragma once
 
 #include "client/camera.h"
+#include "client/shading.h"
 #include "client/shadow.h"
 
 enum { LIGHT_BODY, LIGHT_SHINE, LIGHT_TARGETS };
@@ -20,11 +21,12 @@ typedef struct Lights {
 
 typedef struct Light {
     GLuint program, framebuffer, vao;
+    Shading shading;
     GLuint targets[LIGHT_TARGETS]; // RGBA16F, as wide as the update targets
     int rows;
 } Light;
 
-bool light_create(Light* light, const Gl* gl, Fault* fault);
+bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, Fault* fault);
 void light_free(Light* light, const Gl* gl);
 // Makes room for a style's points. False with a fault, and then there is room as before.
 bool light_fit(Light* light, const Gl* gl, const Update* update, Fault* fault);
@@ -36,5 +38,5 @@ void lights_bind(const Lights* lights, const Gl* gl, GLuint program);
 void light_samplers(const Gl* gl, GLuint program);
 void light_show(const Light* light, const Gl* gl);
 
-void light_run(const Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
+void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
                const Lights* lights, const Frame* frame);

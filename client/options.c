@@ -25,6 +25,9 @@ enum {
     KEY_FOV,
     KEY_LIGHT,
     KEY_BACKGROUND,
+    KEY_SHADING,
+    KEY_MARSCHNER,
+    KEY_COLOUR,
     KEY_TRANSPARENCY,
     KEY_VIEW,
     KEY_TICK,
@@ -61,6 +64,11 @@ static const struct argp_option arguments[] = {
     {"fov", KEY_FOV, "DEG", 0, "vertical (default 45)", 0},
     {"light", KEY_LIGHT, "YAW,PITCH", 0, "where the key light stands (default 40,45)", 0},
     {"background", KEY_BACKGROUND, "RRGGBB", 0, "one sRGB colour instead of the grey backdrop", 0},
+    {"shading", KEY_SHADING, "NAME", 0, "kajiya (default), marschner or banks", 0},
+    {"marschner", KEY_MARSCHNER, "NAME=N,...", 0,
+     "its eta, alpha, beta, width (degrees), shine, through, diffuse; norm=half, paper or deon", 0},
+    {"colour", KEY_COLOUR, "NAME", 0, "of the hair instead of its own: blond, brown, black, red",
+     0},
     {"transparency", KEY_TRANSPARENCY, "NAME", 0,
      "test, or hash (default at 2 or more samples): hash-dithered coverage", 0},
     {"view", KEY_VIEW, "NAME", 0, "shaded (default) or coverage: hair as linear grey", 0},
@@ -240,6 +248,7 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
     static const char* const views[] = {"shaded", "coverage", NULL};
     ShadeOptions* shade = &options->shade;
     CameraOptions* camera = &options->camera;
+    Fault fault = {""};
     char after;
     switch (key) {
     case KEY_BACKEND:
@@ -275,6 +284,18 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         break;
     case KEY_BACKGROUND:
         parse_background(state, value, shade);
+        break;
+    case KEY_SHADING:
+        shade->shading.kind = (ShadingKind)choice(state, "shading", value, shading_names);
+        break;
+    case KEY_MARSCHNER:
+        if (!shading_parse(&shade->shading, value, &fault))
+            argp_error(state, "--marschner %s: %s", value, fault.text);
+        options->has_marschner = true;
+        break;
+    case KEY_COLOUR:
+        shade->colour = choice(state, "colour", value, shading_colour_names);
+        shade->has_colour = true;
         break;
     case KEY_TRANSPARENCY:
         shade->transparency = choice(state, "transparency", value, transparencies)
@@ -347,6 +368,8 @@ static void check(struct argp_state* state, const Options* options)
     if (options->motion != NULL && strcmp(options->motion, "bus") == 0)
         argp_error(state, "--motion bus: --embedded hears no bus; choose another motion");
     if (options->epoch != 0 && options->log == NULL) argp_error(state, "--epoch goes with --log");
+    if (options->has_marschner && options->shade.shading.kind != SHADING_MARSCHNER)
+        argp_error(state, "--marschner goes with --shading marschner");
     if (options->shade.transparency == TRANSPARENCY_HASH && options->shade.samples < 2)
         argp_error(state, "--transparency hash needs --msaa 2 or 4");
 }

@@ -19,6 +19,7 @@ typedef struct Options {
     int slot;
     const char* backend;
     ShadeOptions shade;
+    bool has_marschner; // parameters of that shading
     CameraOptions camera;
     // Which ticks.
     bool has_ticks;

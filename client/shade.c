@@ -14,6 +14,7 @@ ShadeOptions shade_default(void)
     return (ShadeOptions){.width = 1024,
                           .height = 768,
                           .samples = 4,
+                          .shading = shading_default(),
                           .light_yaw_deg = 40.0f,
                           .light_pitch_deg = 45.0f};
 }
@@ -75,8 +76,11 @@ static bool build_programs(Shade* shade, const Gl* gl, Fault* fault)
     if (shade->hair_program == 0) return false;
     hair_samplers(gl, shade->hair_program);
     light_samplers(gl, shade->hair_program);
-    shade->body_program = program_build(gl, "body.vert", "body.frag", NULL, fault);
+    char shading[SHADING_DEFINES_BYTES];
+    shading_defines(&shade->options.shading, shading);
+    shade->body_program = program_build(gl, "body.vert", "body.frag", shading, fault);
     if (shade->body_program == 0) return false;
+    shading_samplers(gl, shade->body_program);
     shadow_samplers(gl, shade->body_program);
     shade->background_program =
         program_build(gl, "fullscreen.vert", "background.frag", NULL, fault);
@@ -149,7 +153,7 @@ static void use_program(const Shade* shade, const Gl* gl, GLuint program, const 
                         const Hair* hair, const Frame* frame)
 {
     const Camera* camera = &frame->camera;
-    const HairMaterial* material = &hair->style->material;
+    const HairMaterial* material = &hair->material;
     Mat4 view_projection = matrix_mul(&camera->projection, &camera->view);
     gl->UseProgram(program);
     gl->UniformMatrix4fv(program_uniform(gl, program, "view_projection"), 1, GL_FALSE,
@@ -194,6 +198,7 @@ int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* 
     gl->Clear(GL_DEPTH_BUFFER_BIT);
     draw_background(shade, gl);
     use_program(shade, gl, shade->body_program, shadow, hair, frame);
+    shading_bind(&light->shading, gl, shade->body_program);
     int calls = body_draw(&hair->body, gl);
     use_program(shade, gl, shade->hair_program, shadow, hair, frame);
     light_show(light, gl);

@@ -1,7 +1,7 @@
 // Skin and clothes: Lambert, softened at the terminator where it is skin. The scalp is shaded as hair
 // with the tangents of the hair that grows there, so that gaps between wisps show roots, not skin.
 #include "lights.glsl"
-#include "kajiya.glsl"
+#include "shading.glsl"
 #include "transmittance.glsl"
 
 in vec3 v_position, v_normal, v_tangent;
@@ -33,9 +33,9 @@ void main()
                 SKY * (0.7 + 0.3 * normal.y) * v_albedo.rgb;
     vec3 half_way = normalize(view + key_direction);
     skin += 0.02 * KEY * lit * pow(max(dot(normal, half_way), 0.0), 24.0);
-    Strand strand = Strand(normalize(v_tangent + vec3(1e-6)), normal, root_colour);
-    vec3 scalp = KEY * lit * kajiya_shade(strand, key_direction, view).body +
-                 0.35 * RIM * kajiya_shade(strand, rim_direction, view).body +
+    Strand strand = Strand(normalize(v_tangent + vec3(1e-6)), normal, root_colour, 0.0);
+    vec3 scalp = KEY * lit * strand_shade(strand, key_direction, view).body +
+                 0.35 * RIM * strand_shade(strand, rim_direction, view).body +
                  0.35 * SKY * root_colour;
     out_radiance = vec4(mix(skin, scalp, v_albedo.a), 0.0);
 }

@@ -1,25 +1,8 @@
 // Kajiya and Kay 1989, with outward light and view vectors: a strand reflects into the cone
 // T.V = -T.L, so the specular base is sin sin - (T.L)(T.V). (The thesis prints +, which is right only
 // for a light vector that points along the ray.)
-struct Strand {
-    vec3 tangent, normal;
-    vec3 colour;
-};
-
-// Radiance in two parts: what has the hair's colour, and the first highlight, which has the light's.
-struct Lobes {
-    vec3 body, shine;
-};
-
-Lobes scaled(Lobes lobes, float by)
-{
-    return Lobes(lobes.body * by, lobes.shine * by);
-}
-
-Lobes added(Lobes a, Lobes b)
-{
-    return Lobes(a.body + b.body, a.shine + b.shine);
-}
+#include "lights.glsl"
+#include "strand.glsl"
 
 float kajiya_diffuse(vec3 tangent, vec3 light)
 {
@@ -39,7 +22,7 @@ float kajiya_specular(vec3 tangent, vec3 light, vec3 view, float exponent)
 // (Marschner 2003 measured 5-10 degrees; Scheuermann 2004 shifts the tangent for it).
 Lobes kajiya_shade(Strand s, vec3 light, vec3 view)
 {
-    float wrap = clamp((dot(s.normal, light) + 0.35) / 1.35, 0.0, 1.0);
+    float wrap = faces(s.normal, light);
     vec3 towards_root = normalize(s.tangent - 0.10 * s.normal);
     vec3 towards_tip = normalize(s.tangent + 0.14 * s.normal);
     float second = kajiya_specular(towards_tip, light, view, 14.0);

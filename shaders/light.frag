@@ -1,6 +1,6 @@
 // Light pass: radiance of every ribbon point towards the eye (client/light.h says why points).
 #include "lights.glsl"
-#include "kajiya.glsl"
+#include "shading.glsl"
 #include "transmittance.glsl"
 uniform sampler2D drawn_positions, drawn_normals, drawn_tangents;
 uniform mat3 head_rotation;
@@ -19,12 +19,12 @@ void main()
     float along = tangent.w;
     vec3 view = normalize(eye - position);
     Strand strand = Strand(normalize(head_rotation * tangent.xyz), normalize(normal),
-                           mix(root_colour, tip_colour, along));
-    Lobes sum = scaled(kajiya_shade(strand, key_direction, view), KEY * hair_lit(position));
+                           mix(root_colour, tip_colour, along), along);
+    Lobes sum = scaled(strand_shade(strand, key_direction, view), KEY * hair_lit(position));
     // Deeper hair sees less of what casts no shadow here.
     float open = 0.35 + 0.65 * smoothstep(0.0, 0.6, along);
-    sum = added(sum, scaled(kajiya_shade(strand, fill_direction, view), FILL * open));
-    sum = added(sum, scaled(kajiya_shade(strand, rim_direction, view), RIM * open));
+    sum = added(sum, scaled(strand_shade(strand, fill_direction, view), FILL * open));
+    sum = added(sum, scaled(strand_shade(strand, rim_direction, view), RIM * open));
     out_body = vec4(sum.body + SKY * open * (0.6 + 0.4 * normal.y) * strand.colour, 1.0);
     out_shine = vec4(sum.shine, 1.0);
 }

@@ -331,6 +331,7 @@ static const Study studies[] = {
     {"tree", "what the Adaptive Wisp Tree saves and what it gets wrong", study_tree},
     {"reference", "our pictures against path-traced ones of the same strands (../shared/assets)",
      study_reference},
+    {"shading", "errors and prices of the shadings and of the tables of marschner", study_shading},
 };
 #define STUDIES (sizeof studies / sizeof studies[0])
 

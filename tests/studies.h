@@ -16,6 +16,7 @@ bool study_accuracy(Fault* fault);
 bool study_stability(Fault* fault);
 bool study_tree(Fault* fault);
 bool study_reference(Fault* fault);
+bool study_shading(Fault* fault);
 
 // "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.
 void study_machine(void);

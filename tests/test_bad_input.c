@@ -67,6 +67,9 @@ static void unknown_options_and_values_are_wrong_usage(void** state)
     expect_refused(&stage, 2, "--ticks", "A:B",
                    ARGS(CLIENT, "--embedded", "--ticks", "0:4294967297"));
     expect_refused(&stage, 2, "--motion", "shake", ARGS(SERVER, "--motion", "jumping"));
+    expect_refused(&stage, 2, "--shading", "marschner", ARGS(CLIENT, "--shading", "phong"));
+    expect_refused(&stage, 2, "--colour", "blond", ARGS(CLIENT, "--colour", "green"));
+    expect_refused(&stage, 2, "--marschner", "beta", ARGS(CLIENT, "--marschner", "beta=99"));
     stage_remove(&stage);
 }
 
@@ -85,6 +88,8 @@ static void options_that_contradict_are_wrong_usage(void** state)
                    ARGS(CLIENT, "--embedded", "--tick", "1", "--ticks", "4:5"));
     expect_refused(&stage, 2, "--tick", "once",
                    ARGS(CLIENT, "--embedded", "--tick", "1", "--tick", "2"));
+    expect_refused(&stage, 2, "--marschner", "--shading",
+                   ARGS(CLIENT, "--embedded", "--marschner", "beta=6"));
     expect_refused(&stage, 2, "--background", "hex",
                    ARGS(CLIENT, "--embedded", "--background", "+1+2+3"));
     expect_refused(&stage, 2, "--background", "hex",

@@ -458,6 +458,58 @@ static void steady_state_allocates_nothing(void** state)
     stage_close(&stage);
 }
 
+static void table_of_a_fibre_is_made_anew_without_an_allocation(void** state)
+{
+    (void)state;
+    if (!COUNTS_ALLOCATIONS) {
+        printf("SKIPPED: the sanitizer owns malloc\n");
+        skip();
+    }
+    ShadeOptions options = small_picture(VIEW_SHADED);
+    options.shading.kind = SHADING_MARSCHNER;
+    Stage stage;
+    if (!stage_open(&stage, "osmesa", bob, options, camera_default()) &&
+        !stage_open(&stage, "egl", bob, options, camera_default()))
+        skip();
+    int64_t began = 0;
+    for (int tick = 0; tick < 4; ++tick) {
+        drawing_put_tick(&stage.view, bob, tick, (uint32_t)tick, 0.2f);
+        stage.drawing.light.shading.options.fibre.beta_deg = 5.0 + tick / 2;
+        if (tick == 1) began = own_allocations;
+        must_draw(&stage);
+    }
+    assert_int_equal(own_allocations, began);
+    assert_int_equal(stage.drawing.light.shading.tables_made, 2);
+    stage_close(&stage);
+}
+
+// The colour that was asked for, and no other, is seen in the picture.
+static void hair_takes_the_colour_that_is_asked_for(void** state)
+{
+    (void)state;
+    double red[2] = {0, 0}, green[2] = {0, 0};
+    for (int i = 0; i < 2; ++i) {
+        ShadeOptions options = small_picture(VIEW_SHADED);
+        options.shading.kind = SHADING_MARSCHNER;
+        options.has_colour = true;
+        options.colour = i == 0 ? 0 : 3; // blond, red
+        Stage stage;
+        if (!stage_open(&stage, "osmesa", bob, options, camera_default()) &&
+            !stage_open(&stage, "egl", bob, options, camera_default()))
+            skip();
+        drawing_put_tick(&stage.view, bob, 0, 1, 0.0f);
+        must_draw(&stage);
+        for (int p = 0; p < WIDTH * HEIGHT; ++p)
+            if (stage.image.rgba[4 * p + 3] == 255) {
+                red[i] += stage.image.rgba[4 * p];
+                green[i] += stage.image.rgba[4 * p + 1];
+            }
+        stage_close(&stage);
+    }
+    assert_true(green[0] > 0.75 * red[0]);
+    assert_true(green[1] < 0.60 * red[1] && green[1] > 0.0);
+}
+
 // --- statistics
 
 static void stats_have_the_fixed_keys_and_true_counts(void** state)
@@ -592,6 +644,8 @@ int main(void)
         cmocka_unit_test(same_style_again_costs_nothing),
         cmocka_unit_test(counter_sees_our_own_allocations),
         cmocka_unit_test(steady_state_allocates_nothing),
+        cmocka_unit_test(table_of_a_fibre_is_made_anew_without_an_allocation),
+        cmocka_unit_test(hair_takes_the_colour_that_is_asked_for),
         cmocka_unit_test(stats_have_the_fixed_keys_and_true_counts),
         cmocka_unit_test(imported_groom_covers_what_the_path_traced_masks_cover),
     };
