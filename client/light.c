@@ -74,6 +74,7 @@ void lights_bind(const Lights* lights, const Gl* gl, GLuint program)
     program_uniform3(gl, program, "key_direction", lights->key);
     program_uniform3(gl, program, "fill_direction", lights->fill);
     program_uniform3(gl, program, "rim_direction", lights->rim);
+    gl->Uniform4fv(program_uniform(gl, program, "light_strength"), 1, lights->strength);
     gl->Uniform1f(program_uniform(gl, program, "extinction"), lights->extinction_per_m);
 }
 

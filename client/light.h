@@ -11,12 +11,14 @@
 #include "client/shading.h"
 #include "client/shadow.h"
 
+enum { LIGHT_KEY, LIGHT_FILL, LIGHT_RIM, LIGHT_SKY, LIGHT_STRENGTHS };
 enum { LIGHT_BODY, LIGHT_SHINE, LIGHT_TARGETS };
 
 // Towards key, fill and rim light, unit, world axes.
 typedef struct Lights {
     Vec3 key, fill, rim;
-    float extinction_per_m; // of hair, for transmittance
+    float strength[LIGHT_STRENGTHS]; // irradiance of the three; radiance of the sky
+    float extinction_per_m;          // of hair, for transmittance
 } Lights;
 
 typedef struct Light {

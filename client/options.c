@@ -24,6 +24,7 @@ enum {
     KEY_PITCH,
     KEY_FOV,
     KEY_LIGHT,
+    KEY_LIGHTS,
     KEY_BACKGROUND,
     KEY_SHADING,
     KEY_MARSCHNER,
@@ -63,8 +64,11 @@ static const struct argp_option arguments[] = {
     {"pitch", KEY_PITCH, "DEG", 0, "positive looks down (default 5)", 0},
     {"fov", KEY_FOV, "DEG", 0, "vertical (default 45)", 0},
     {"light", KEY_LIGHT, "YAW,PITCH", 0, "where the key light stands (default 40,45)", 0},
+    {"lights", KEY_LIGHTS, "KEY,FILL,RIM,SKY", 0,
+     "irradiance of the three lights, radiance of the sky (default 3,0.6,2,0.25)", 0},
     {"background", KEY_BACKGROUND, "RRGGBB", 0, "one sRGB colour instead of the grey backdrop", 0},
-    {"shading", KEY_SHADING, "NAME", 0, "kajiya (default), marschner or banks", 0},
+    {"shading", KEY_SHADING, "NAME", 0,
+     "kajiya (default), marschner, banks, or clay: white, to judge light and shadow", 0},
     {"marschner", KEY_MARSCHNER, "NAME=N,...", 0,
      "its eta, alpha, beta, width (degrees), shine, through, diffuse; norm=half, paper or deon", 0},
     {"colour", KEY_COLOUR, "NAME", 0, "of the hair instead of its own: blond, brown, black, red",
@@ -161,6 +165,18 @@ static void parse_background(struct argp_state* state, const char* value, ShadeO
         argp_error(state, "--background %s: want six hex digits RRGGBB, like 898989", value);
     shade->has_background = true;
     shade->background = vec3(linear(r), linear(g), linear(b));
+}
+
+static void parse_lights(struct argp_state* state, const char* value, float* strength)
+{
+    char after;
+    bool right = sscanf(value, "%f,%f,%f,%f%c", strength, strength + 1, strength + 2, strength + 3,
+                        &after) == 4;
+    for (int i = 0; i < LIGHT_STRENGTHS; ++i)
+        right = right && strength[i] >= 0.0f && strength[i] <= 1000.0f;
+    if (!right)
+        argp_error(state, "--lights %s: want KEY,FILL,RIM,SKY, 0 to 1000 each, like 3,0.6,2,0.25",
+                   value);
 }
 
 static void parse_target(struct argp_state* state, const char* value, CameraOptions* camera)
@@ -281,6 +297,9 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         if (sscanf(value, "%f,%f%c", &shade->light_yaw_deg, &shade->light_pitch_deg, &after) != 2 ||
             !isfinite(shade->light_yaw_deg) || !(fabsf(shade->light_pitch_deg) <= 90.0f))
             argp_error(state, "--light %s: want YAW,PITCH in degrees, like 40,45", value);
+        break;
+    case KEY_LIGHTS:
+        parse_lights(state, value, shade->light_strength);
         break;
     case KEY_BACKGROUND:
         parse_background(state, value, shade);

@@ -15,6 +15,8 @@ ShadeOptions shade_default(void)
                           .height = 768,
                           .samples = 4,
                           .shading = shading_default(),
+                          // The three lights of a photographer, 3 : 0.6 : 2.
+                          .light_strength = {3.0f, 0.6f, 2.0f, 0.25f},
                           .light_yaw_deg = 40.0f,
                           .light_pitch_deg = 45.0f};
 }
@@ -97,6 +99,7 @@ static void place_lights(Shade* shade)
     shade->lights.key = camera_direction(yaw, pitch);
     shade->lights.fill = camera_direction(yaw - 100.0f, 10.0f);
     shade->lights.rim = camera_direction(yaw + 120.0f, 35.0f);
+    memcpy(shade->lights.strength, shade->options.light_strength, sizeof shade->lights.strength);
     shade->lights.extinction_per_m = EXTINCTION_PER_M;
 }
 

@@ -20,6 +20,7 @@ typedef struct ShadeOptions {
     bool has_background;
     Vec3 background;                      // linear; without it a soft grey backdrop
     float light_yaw_deg, light_pitch_deg; // of the key light; fill and rim keep their places to it
+    float light_strength[LIGHT_STRENGTHS];
 } ShadeOptions;
 
 typedef struct Shade {

@@ -21,8 +21,9 @@ typedef struct ShadingRow {
 
 static const ShadingRow rows[SHADINGS] = {[SHADING_KAJIYA] = {"kajiya_shade", false},
                                           [SHADING_MARSCHNER] = {"marschner_shade", true},
-                                          [SHADING_BANKS] = {"banks_shade", false}};
-const char* const shading_names[SHADINGS + 1] = {"kajiya", "marschner", "banks", NULL};
+                                          [SHADING_BANKS] = {"banks_shade", false},
+                                          [SHADING_CLAY] = {"clay_shade", false}};
+const char* const shading_names[SHADINGS + 1] = {"kajiya", "marschner", "banks", "clay", NULL};
 
 typedef struct NamedColour {
     Vec3 root, tip;

@@ -6,7 +6,13 @@
 #include "client/marschner.h"
 #include "messages/hairstyle.h"
 
-typedef enum ShadingKind { SHADING_KAJIYA, SHADING_MARSCHNER, SHADING_BANKS, SHADINGS } ShadingKind;
+typedef enum ShadingKind {
+    SHADING_KAJIYA,
+    SHADING_MARSCHNER,
+    SHADING_BANKS,
+    SHADING_CLAY,
+    SHADINGS
+} ShadingKind;
 
 extern const char* const shading_names[SHADINGS + 1]; // as on the command line; NULL ends them
 

@@ -1,5 +1,9 @@
 // Key (shadowed), fill and rim (not: more than one shadowed light is left out on purpose), and a soft
-// sky. Irradiances follow the three-light set-up of a photographer: 3 : 0.6 : 2.
+// sky.
 uniform vec3 key_direction, fill_direction, rim_direction; // towards the light, unit
-const float KEY = 3.0, FILL = 0.6, RIM = 2.0, SKY = 0.25;
+uniform vec4 light_strength; // irradiance of the three, across their direction; radiance of the sky
+#define KEY  light_strength.x
+#define FILL light_strength.y
+#define RIM  light_strength.z
+#define SKY  light_strength.w
 const float INV_PI = 0.31830988618;

@@ -3,3 +3,4 @@
 #include "kajiya.glsl"
 #include "marschner.glsl"
 #include "banks.glsl"
+#include "clay.glsl"

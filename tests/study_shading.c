@@ -162,8 +162,11 @@ static bool open_scene(Scene* scene, const Gl* gl, Fault* fault)
     guides_view_free(&view);
     update_run(&scene->hair.update, gl, &scene->hair.guides, 1.0f);
     CameraOptions camera = camera_default();
-    scene->lights = (Lights){camera_direction(40, 45), camera_direction(-60, 10),
-                             camera_direction(160, 35), 90.0f};
+    scene->lights = (Lights){camera_direction(40, 45),
+                             camera_direction(-60, 10),
+                             camera_direction(160, 35),
+                             {3.0f, 0.6f, 2.0f, 0.25f},
+                             90.0f};
     scene->frame = (Frame){.camera = camera_orbit(&camera, scene->style, 1.3f),
                            .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
                            .bounds = scene->style->box};
