@@ -12,7 +12,8 @@ const GoldenScene golden_scenes[] = {
     {"long-shake", "--style long --motion shake --tick 62 --yaw 150 --distance 0.66 "
                    "--target 0,0.14,0" SMALL},
     {"long-test", "--style long --motion nod --tick 40 --yaw 60 --distance 0.6 --msaa 1" SMALL},
-    {"long-gust", "--style long --motion gust --tick 90 --yaw 0 --distance 0.6" SMALL},
+    {"long-gust", "--style long --motion gust --tick 90 --yaw 0 --distance 0.6 "
+                  "--transparency blend" SMALL},
     {"long-behind", "--style long --tick 5 --yaw 40 --distance 0.6 --light 200,30" SMALL},
     {"long-far", "--style long --motion run --tick 50 --yaw 30 --distance 1.6 "
                  "--background 404040" SMALL},
@@ -24,7 +25,8 @@ const GoldenScene golden_scenes[] = {
                  "--target 0.09,0.135,-0.01" SMALL}, // so near that one wisp is a part of it
     {"ponytail", "--style ponytail --motion shake --tick 72 --yaw 100 --distance 0.54 "
                  "--target 0,0.17,0" SMALL},
-    {"crest", "--style crest --motion shake --tick 40 --yaw 65 --distance 0.62" SMALL},
+    {"crest", "--style crest --motion shake --tick 40 --yaw 65 --distance 0.62 "
+              "--transparency coverage --pre-z on" SMALL},
     {NULL, NULL}};
 
 const GoldenScene* golden_scene(const char* name)
