@@ -96,6 +96,20 @@ static void end_pass(Drawing* drawing, int pass, int64_t began_us)
         (float)(base_monotonic_us() - began_us) * 1e-3f;
 }
 
+// Puts hair in the order that its transparency wants, if any.
+static void sort_hair(Drawing* drawing, const GuidesView* view, const Frame* frame)
+{
+    OrderBy by;
+    bool far_first;
+    if (!shade_sorts(&drawing->shade, &by, &far_first)) return;
+    Hair* hair = &drawing->hair;
+    const float* r = frame->rotation;
+    Vec3 e = frame->camera.eye; // world axes: back to the head's
+    Vec3 eye = vec3(r[0] * e.x + r[3] * e.y + r[6] * e.z, r[1] * e.x + r[4] * e.y + r[7] * e.z,
+                    r[2] * e.x + r[5] * e.y + r[8] * e.z);
+    order_sort(&hair->order, drawing->gl, &hair->ribbons, hair->style, view, eye, by, far_first);
+}
+
 bool draw_picture(Drawing* drawing, const GuidesView* view, Image* image)
 {
     if (!drawing->has_style) return false;
@@ -128,6 +142,7 @@ bool draw_picture(Drawing* drawing, const GuidesView* view, Image* image)
     end_pass(drawing, PASS_LIGHT, began);
 
     began = begin_pass(drawing);
+    sort_hair(drawing, view, &frame);
     drawing->draw_calls +=
         2 + shade_run(&drawing->shade, gl, hair, &drawing->shadow, &drawing->light, &frame);
     end_pass(drawing, PASS_SHADE, began);

@@ -42,6 +42,14 @@ static float height(uint32_t seed, double u, const double* centres)
     return (float)best;
 }
 
+// Ranks of `count` heights, spread evenly over a byte.
+static void rank(unsigned char* ranks, Ranked* order, int count)
+{
+    qsort(order, (size_t)count, sizeof *order, by_height);
+    for (int i = 0; i < count; ++i)
+        ranks[order[i].at] = (unsigned char)((int64_t)(2 * i + 1) * 256 / (2 * count));
+}
+
 bool fibres_ranks(unsigned char* ranks, int layer)
 {
     int count = FIBRES_SIZE * FIBRES_SIZE;
@@ -57,10 +65,38 @@ bool fibres_ranks(unsigned char* ranks, int layer)
             order[i] = (Ranked){height(seed, (column + 0.5) / FIBRES_SIZE, centres), i};
         }
     }
-    qsort(order, (size_t)count, sizeof *order, by_height);
-    for (int i = 0; i < count; ++i)
-        ranks[order[i].at] = (unsigned char)((int64_t)i * 256 / count);
+    rank(ranks, order, count);
     free(order);
+    return true;
+}
+
+bool fibres_halve(unsigned char* half, const unsigned char* ranks, int size)
+{
+    int side = size / 2;
+    Ranked* order = malloc((size_t)(side * side) * sizeof *order);
+    if (order == NULL) return false;
+    for (int i = 0; i < side * side; ++i) {
+        const unsigned char* at = ranks + 2 * (i / side) * size + 2 * (i % side);
+        order[i] = (Ranked){(float)(at[0] + at[1] + at[size] + at[size + 1]), i};
+    }
+    rank(half, order, side * side);
+    free(order);
+    return true;
+}
+
+// Level by level, as `ranks` is halved in place.
+static bool upload_levels(const Gl* gl, unsigned char* ranks)
+{
+    gl->PixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    for (int level = 0, size = FIBRES_SIZE; level < FIBRES_LEVELS; ++level, size /= 2) {
+        gl->TexImage3D(GL_TEXTURE_2D_ARRAY, level, GL_R8, size, size, FIBRES_LAYERS, 0, GL_RED,
+                       GL_UNSIGNED_BYTE, ranks);
+        for (int layer = 0; layer < FIBRES_LAYERS; ++layer) {
+            // In place: what is written lies before all that is still to be read.
+            unsigned char* to = ranks + layer * (size / 2) * (size / 2);
+            if (!fibres_halve(to, ranks + layer * size * size, size)) return false;
+        }
+    }
     return true;
 }
 
@@ -75,16 +111,16 @@ GLuint fibres_create(const Gl* gl, Fault* fault)
     if (made) {
         gl->GenTextures(1, &texture);
         gl->BindTexture(GL_TEXTURE_2D_ARRAY, texture);
-        gl->PixelStorei(GL_UNPACK_ALIGNMENT, 1);
-        gl->TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R8, FIBRES_SIZE, FIBRES_SIZE, FIBRES_LAYERS, 0,
-                       GL_RED, GL_UNSIGNED_BYTE, ranks);
-        gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+        made = upload_levels(gl, ranks);
+        gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, FIBRES_LEVELS - 1);
+        gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
         gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
         gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_S, GL_REPEAT);
         gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_T, GL_REPEAT);
-    } else {
-        fault_set(fault, "no memory for the fibre texture");
     }
     free(ranks);
-    return texture;
+    if (made) return texture;
+    gl->DeleteTextures(1, &texture);
+    fault_set(fault, "no memory for the fibre texture");
+    return 0;
 }

@@ -21,6 +21,9 @@
     X(void, ClearDepth, (GLdouble depth)) \
     X(void, Viewport, (GLint x, GLint y, GLsizei width, GLsizei height)) \
     X(void, DepthMask, (GLboolean flag)) \
+    X(void, DepthFunc, (GLenum func)) \
+    X(void, ColorMask, (GLboolean red, GLboolean green, GLboolean blue, GLboolean alpha)) \
+    X(void, BlendFuncSeparate, (GLenum rgb_source, GLenum rgb_there, GLenum alpha_source, GLenum alpha_there)) \
     X(void, PixelStorei, (GLenum pname, GLint param)) \
     X(void, Finish, (void)) \
     X(void, ReadPixels, (GLint x, GLint y, GLsizei width, GLsizei height, GLenum format, GLenum type, void* pixels)) \

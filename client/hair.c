@@ -12,7 +12,8 @@ bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault)
     if (!ribbons_build(&hair->ribbons, style, fault) ||
         !upload_create(&hair->guides, gl, style, fault) ||
         !update_create(&hair->update, gl, style, &hair->ribbons, fault) ||
-        !body_build(&hair->body, gl, style, &hair->ribbons, fault)) {
+        !body_build(&hair->body, gl, style, &hair->ribbons, fault) ||
+        !order_create(&hair->order, gl, &hair->ribbons, style, fault)) {
         hair_free(hair, gl);
         return false;
     }
@@ -33,6 +34,7 @@ void hair_free(Hair* hair, const Gl* gl)
     upload_free(&hair->guides, gl);
     update_free(&hair->update, gl);
     body_free(&hair->body, gl);
+    order_free(&hair->order, gl);
     gl->DeleteVertexArrays(1, &hair->vao);
     gl->DeleteBuffers(1, &hair->indices);
     memset(hair, 0, sizeof *hair);
@@ -47,9 +49,9 @@ void hair_samplers(const Gl* gl, GLuint program)
     program_sampler(gl, program, "fibre_ranks", UNIT_FIBRES);
 }
 
-int hair_draw(const Hair* hair, const Gl* gl, GLuint fibres)
+static int draw(const Hair* hair, const Gl* gl, GLuint fibres, GLuint vao, int index_count)
 {
-    if (hair->ribbons.index_count == 0) return 0;
+    if (index_count == 0) return 0;
     const GLuint textures[UNIT_FREE] = {
         hair->update.targets[UPDATE_POSITIONS], hair->update.targets[UPDATE_NORMALS],
         hair->update.targets[UPDATE_TANGENTS], hair->update.tables[TABLE_OFFSETS], fibres};
@@ -60,8 +62,18 @@ int hair_draw(const Hair* hair, const Gl* gl, GLuint fibres)
     gl->ActiveTexture(GL_TEXTURE0);
     gl->Enable(GL_PRIMITIVE_RESTART);
     gl->PrimitiveRestartIndex(RIBBONS_RESTART);
-    gl->BindVertexArray(hair->vao);
-    gl->DrawElements(GL_TRIANGLE_STRIP, hair->ribbons.index_count, GL_UNSIGNED_INT, NULL);
+    gl->BindVertexArray(vao);
+    gl->DrawElements(GL_TRIANGLE_STRIP, index_count, GL_UNSIGNED_INT, NULL);
     gl->Disable(GL_PRIMITIVE_RESTART);
     return 1;
+}
+
+int hair_draw(const Hair* hair, const Gl* gl, GLuint fibres)
+{
+    return draw(hair, gl, fibres, hair->vao, hair->ribbons.index_count);
+}
+
+int hair_draw_sorted(const Hair* hair, const Gl* gl, GLuint fibres)
+{
+    return draw(hair, gl, fibres, hair->order.vao, hair->order.index_count);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "client/body.h"
+#include "client/order.h"
 #include "client/update.h"
 
 typedef struct Hair {
@@ -11,6 +12,7 @@ typedef struct Hair {
     GuideTextures guides;
     Update update;
     Body body;
+    Order order;
     GLuint vao, indices;
 } Hair;
 
@@ -25,3 +27,5 @@ void hair_samplers(const Gl* gl, GLuint program);
 // Binds the style's tables and draws all ribbons with the program in use. Returns the draw calls:
 // 1, or 0 where there is nothing to draw.
 int hair_draw(const Hair* hair, const Gl* gl, GLuint fibres);
+// The same in the order of the last order_sort.
+int hair_draw_sorted(const Hair* hair, const Gl* gl, GLuint fibres);

@@ -30,6 +30,8 @@ enum {
     KEY_MARSCHNER,
     KEY_COLOUR,
     KEY_TRANSPARENCY,
+    KEY_PRE_Z,
+    KEY_SORT,
     KEY_VIEW,
     KEY_TICK,
     KEY_TICKS,
@@ -56,7 +58,7 @@ static const struct argp_option arguments[] = {
     {0, 0, 0, 0, "The picture", 2},
     {"backend", KEY_BACKEND, "NAME", 0, "auto (default), egl, osmesa or null", 0},
     {"size", KEY_SIZE, "WxH", 0, "pixels (default 1024x768)", 0},
-    {"msaa", KEY_MSAA, "N", 0, "samples a pixel: 1, 2 or 4 (default)", 0},
+    {"msaa", KEY_MSAA, "N", 0, "samples a pixel: 1, 2, 4 (default) or 8", 0},
     {"target", KEY_TARGET, "X,Y,Z", 0,
      "what the camera orbits, head space m (default: head centre)", 0},
     {"distance", KEY_DISTANCE, "M", 0, "from the target (default: all of the hair is seen)", 0},
@@ -74,7 +76,14 @@ static const struct argp_option arguments[] = {
     {"colour", KEY_COLOUR, "NAME", 0, "of the hair instead of its own: blond, brown, black, red",
      0},
     {"transparency", KEY_TRANSPARENCY, "NAME", 0,
-     "test, or hash (default at 2 or more samples): hash-dithered coverage", 0},
+     "test (default at 1 sample), coverage: GL's alpha to coverage, hash (default at 2 or more): "
+     "hash-dithered coverage, or blend: sorted from back to front",
+     0},
+    {"pre-z", KEY_PRE_Z, "on|off", 0, "draw hair's depth first (default off)", 0},
+    {"sort", KEY_SORT, "NAME", 0,
+     "by distance, each picture: off, wisps or segments (default for blend, from back to front; "
+     "others are sorted from front to back)",
+     0},
     {"view", KEY_VIEW, "NAME", 0, "shaded (default) or coverage: hair as linear grey", 0},
     {0, 0, 0, 0, "Which ticks", 3},
     {"tick", KEY_TICK, "N", 0, "draw exactly tick N (log, embedded)", 0},
@@ -260,7 +269,9 @@ static error_t parse_source(int key, char* value, struct argp_state* state, Opti
 static error_t parse_picture(int key, char* value, struct argp_state* state, Options* options)
 {
     static const char* const backends[] = {"auto", "egl", "osmesa", "null", NULL};
-    static const char* const transparencies[] = {"test", "hash", NULL};
+    static const char* const transparencies[] = {"test", "coverage", "hash", "blend", NULL};
+    static const char* const switches[] = {"on", "off", NULL};
+    static const char* const sorts[] = {"off", "wisps", "segments", NULL};
     static const char* const views[] = {"shaded", "coverage", NULL};
     ShadeOptions* shade = &options->shade;
     CameraOptions* camera = &options->camera;
@@ -274,8 +285,9 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         parse_size(state, value, shade);
         break;
     case KEY_MSAA:
-        shade->samples = (int)integer(state, "msaa", value, 1, 4);
-        if (shade->samples == 3) argp_error(state, "--msaa 3: choose 1, 2 or 4");
+        shade->samples = (int)integer(state, "msaa", value, 1, 8);
+        if ((shade->samples & (shade->samples - 1)) != 0)
+            argp_error(state, "--msaa %s: choose 1, 2, 4 or 8", value);
         break;
     case KEY_TARGET:
         parse_target(state, value, camera);
@@ -317,9 +329,14 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         shade->has_colour = true;
         break;
     case KEY_TRANSPARENCY:
-        shade->transparency = choice(state, "transparency", value, transparencies)
-                                  ? TRANSPARENCY_HASH
-                                  : TRANSPARENCY_TEST;
+        shade->transparency =
+            TRANSPARENCY_TEST + (Transparency)choice(state, "transparency", value, transparencies);
+        break;
+    case KEY_PRE_Z:
+        shade->pre_z = choice(state, "pre-z", value, switches) == 0;
+        break;
+    case KEY_SORT:
+        shade->sort = SORT_OFF + (ShadeSort)choice(state, "sort", value, sorts);
         break;
     case KEY_VIEW:
         shade->view = choice(state, "view", value, views) ? VIEW_COVERAGE : VIEW_SHADED;
@@ -390,7 +407,7 @@ static void check(struct argp_state* state, const Options* options)
     if (options->has_marschner && options->shade.shading.kind != SHADING_MARSCHNER)
         argp_error(state, "--marschner goes with --shading marschner");
     if (options->shade.transparency == TRANSPARENCY_HASH && options->shade.samples < 2)
-        argp_error(state, "--transparency hash needs --msaa 2 or 4");
+        argp_error(state, "--transparency hash needs --msaa 2, 4 or 8");
 }
 
 static void refuse_second_range(struct argp_state* state, const Options* options)

@@ -67,17 +67,25 @@ static bool create_target(const Shade* shade, const Gl* gl, GLint format, GLuint
     return complete(gl, "output", fault);
 }
 
+static GLuint build_hair(const Shade* shade, const Gl* gl, TransparencyStep step, Fault* fault)
+{
+    char defines[TRANSPARENCY_DEFINES];
+    transparency_defines(defines, shade->transparency, shade->samples, step);
+    GLuint program = program_build(gl, "hair.vert", "hair.frag", defines, fault);
+    if (program == 0) return 0;
+    hair_samplers(gl, program);
+    light_samplers(gl, program);
+    return program;
+}
+
 static bool build_programs(Shade* shade, const Gl* gl, Fault* fault)
 {
-    bool hash = shade->options.transparency == TRANSPARENCY_HASH ||
-                (shade->options.transparency == TRANSPARENCY_AUTO && shade->samples > 1);
-    char defines[96];
-    snprintf(defines, sizeof defines, "#define TRANSPARENCY_HASH %d\n#define SAMPLES %d\n",
-             hash && shade->samples > 1, shade->samples);
-    shade->hair_program = program_build(gl, "hair.vert", "hair.frag", defines, fault);
+    bool pre_z = shade->options.pre_z;
+    shade->transparency = transparency_choose(shade->options.transparency, shade->samples);
+    shade->hair_program = build_hair(shade, gl, pre_z ? STEP_AFTER_DEPTH : STEP_ALONE, fault);
     if (shade->hair_program == 0) return false;
-    hair_samplers(gl, shade->hair_program);
-    light_samplers(gl, shade->hair_program);
+    if (pre_z) shade->depth_program = build_hair(shade, gl, STEP_DEPTH, fault);
+    if (pre_z && shade->depth_program == 0) return false;
     char shading[SHADING_DEFINES_BYTES];
     shading_defines(&shade->options.shading, shading);
     shade->body_program = program_build(gl, "body.vert", "body.frag", shading, fault);
@@ -122,6 +130,7 @@ bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault
 void shade_free(Shade* shade, const Gl* gl)
 {
     gl->DeleteProgram(shade->hair_program);
+    gl->DeleteProgram(shade->depth_program);
     gl->DeleteProgram(shade->body_program);
     gl->DeleteProgram(shade->background_program);
     gl->DeleteProgram(shade->resolve_program);
@@ -190,6 +199,27 @@ static void resolve(const Shade* shade, const Gl* gl)
     gl->DrawArrays(GL_TRIANGLES, 0, 3);
 }
 
+bool shade_sorts(const Shade* shade, OrderBy* by, bool* far_first)
+{
+    ShadeSort sort = shade->options.sort;
+    *far_first = transparency_variants[shade->transparency].blends;
+    *by = sort == SORT_WISPS ? ORDER_WISPS : ORDER_SEGMENTS;
+    return sort == SORT_AUTO ? *far_first : sort != SORT_OFF;
+}
+
+// One step of hair, with its program in use. Returns the draw calls.
+static int draw_hair(const Shade* shade, const Gl* gl, const Hair* hair, GLuint fibres,
+                     TransparencyStep step)
+{
+    OrderBy by;
+    bool far_first;
+    transparency_begin(gl, shade->transparency, shade->samples, step);
+    int calls = shade_sorts(shade, &by, &far_first) ? hair_draw_sorted(hair, gl, fibres)
+                                                    : hair_draw(hair, gl, fibres);
+    transparency_end(gl);
+    return calls;
+}
+
 int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* shadow,
               const Light* light, const Frame* frame)
 {
@@ -203,9 +233,14 @@ int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* 
     use_program(shade, gl, shade->body_program, shadow, hair, frame);
     shading_bind(&light->shading, gl, shade->body_program);
     int calls = body_draw(&hair->body, gl);
-    use_program(shade, gl, shade->hair_program, shadow, hair, frame);
     light_show(light, gl);
-    calls += hair_draw(hair, gl, shadow->fibres);
+    if (shade->options.pre_z) {
+        use_program(shade, gl, shade->depth_program, shadow, hair, frame);
+        calls += draw_hair(shade, gl, hair, shadow->fibres, STEP_DEPTH);
+    }
+    use_program(shade, gl, shade->hair_program, shadow, hair, frame);
+    calls += draw_hair(shade, gl, hair, shadow->fibres,
+                       shade->options.pre_z ? STEP_AFTER_DEPTH : STEP_ALONE);
     resolve(shade, gl);
     return calls + 2; // and background and resolve
 }

@@ -4,15 +4,18 @@
 #include "client/camera.h"
 #include "client/image.h"
 #include "client/light.h"
+#include "client/transparency.h"
 
-typedef enum Transparency { TRANSPARENCY_AUTO, TRANSPARENCY_TEST, TRANSPARENCY_HASH } Transparency;
+typedef enum ShadeSort { SORT_AUTO, SORT_OFF, SORT_WISPS, SORT_SEGMENTS } ShadeSort;
 typedef enum ShadeView { VIEW_SHADED, VIEW_COVERAGE } ShadeView;
 
 // Everything about a picture that stays from frame to frame.
 typedef struct ShadeOptions {
     int width, height;
-    int samples;               // 1, 2 or 4; lowered to what the driver has
-    Transparency transparency; // auto: hash at 2 or more samples, test at 1
+    int samples; // 1, 2, 4 or 8; lowered to what the driver has
+    Transparency transparency;
+    bool pre_z;     // hair's depth first, then only what is seen of it is shaded
+    ShadeSort sort; // by distance, each picture; auto: segments where they are blended
     ShadeView view;
     ShadingOptions shading;
     bool has_colour; // of hair, instead of the style's
@@ -26,7 +29,9 @@ typedef struct ShadeOptions {
 typedef struct Shade {
     ShadeOptions options;
     int samples;
+    Transparency transparency; // what is drawn of what was asked
     GLuint hair_program, body_program, background_program, resolve_program;
+    GLuint depth_program;               // of hair; 0 without pre-z
     GLuint multisampled, colour, depth; // framebuffer and renderbuffers
     GLuint resolved, resolved_texture;  // one sample a pixel, linear, RGBA16F
     GLuint output, output_texture;      // sRGB, RGBA8
@@ -37,6 +42,9 @@ typedef struct Shade {
 ShadeOptions shade_default(void);
 bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault* fault);
 void shade_free(Shade* shade, const Gl* gl);
+
+// Whether hair must be sorted before a picture, by what, and which comes first.
+bool shade_sorts(const Shade* shade, OrderBy* by, bool* far_first);
 
 // Draws one picture of `hair`. Returns the draw calls made.
 int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* shadow,

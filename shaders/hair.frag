@@ -5,12 +5,13 @@ flat in float v_random;
 in float v_fill;
 uniform int coverage_only;
 
-layout(location = 0) out vec4 out_radiance; // a: 1 where there is hair
+layout(location = 0) out vec4 out_radiance; // a: how much of this is hair
 
 void main()
 {
-    float own = keep_covered(v_place, v_fill, v_random);
+    float own;
+    float alpha = keep_covered(v_place, v_fill, v_random, own);
     float tone = 0.55 + 0.6 * own + 0.3 * fract(v_random * 37.0); // hairs differ, locks too
-    out_radiance = vec4(v_body * tone + v_shine * (0.4 + 1.2 * own), 1.0);
-    if (coverage_only != 0) out_radiance = vec4(1.0);
+    vec3 radiance = v_body * tone + v_shine * (0.4 + 1.2 * own);
+    out_radiance = vec4(coverage_only != 0 ? vec3(1.0) : radiance, alpha);
 }

@@ -7,6 +7,7 @@ uniform float pixel_angle; // metres a pixel spans at one metre
 
 out vec3 v_body, v_shine, v_place;
 flat out float v_random;
+invariant gl_Position; // depth first and colour after must agree to the bit
 out float v_fill;
 
 void main()
