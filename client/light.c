@@ -4,10 +4,10 @@
 
 #include <string.h>
 
-bool light_create(Light* light, const Gl* gl, Fault* fault)
+bool light_create(Light* light, const Gl* gl, const Shadow* shadow, Fault* fault)
 {
     memset(light, 0, sizeof *light);
-    light->program = program_build(gl, "fullscreen.vert", "light.frag", NULL, fault);
+    light->program = program_build(gl, "fullscreen.vert", "light.frag", shadow->defines, fault);
     if (light->program == 0) return false;
     hair_samplers(gl, light->program);
     shadow_samplers(gl, light->program);
@@ -88,7 +88,7 @@ void light_show(const Light* light, const Gl* gl)
 }
 
 void light_run(const Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
-               const Lights* lights, const Frame* frame)
+               const Lights* lights, const Frame* frame, bool transmittance)
 {
     gl->BindFramebuffer(GL_FRAMEBUFFER, light->framebuffer);
     gl->Viewport(0, 0, UPDATE_WIDTH, light->rows);
@@ -99,6 +99,7 @@ void light_run(const Light* light, const Gl* gl, const Hair* hair, const Shadow*
     program_uniform3(gl, light->program, "eye", frame->camera.eye);
     program_uniform3(gl, light->program, "root_colour", hair->style->material.root_colour);
     program_uniform3(gl, light->program, "tip_colour", hair->style->material.tip_colour);
+    gl->Uniform1i(program_uniform(gl, light->program, "transmittance_only"), transmittance);
     lights_bind(lights, gl, light->program);
     shadow_bind(shadow, gl, light->program);
     for (GLenum i = 0; i < UPDATE_TARGETS; ++i) {

@@ -14,6 +14,7 @@ ShadeOptions shade_default(void)
     return (ShadeOptions){.width = 1024,
                           .height = 768,
                           .samples = 4,
+                          .shadow = shadow_default(),
                           .light_yaw_deg = 40.0f,
                           .light_pitch_deg = 45.0f};
 }
@@ -64,7 +65,7 @@ static bool create_target(const Shade* shade, const Gl* gl, GLint format, GLuint
     return complete(gl, "output", fault);
 }
 
-static bool build_programs(Shade* shade, const Gl* gl, Fault* fault)
+static bool build_programs(Shade* shade, const Gl* gl, const Shadow* shadow, Fault* fault)
 {
     bool hash = shade->options.transparency == TRANSPARENCY_HASH ||
                 (shade->options.transparency == TRANSPARENCY_AUTO && shade->samples > 1);
@@ -75,7 +76,7 @@ static bool build_programs(Shade* shade, const Gl* gl, Fault* fault)
     if (shade->hair_program == 0) return false;
     hair_samplers(gl, shade->hair_program);
     light_samplers(gl, shade->hair_program);
-    shade->body_program = program_build(gl, "body.vert", "body.frag", NULL, fault);
+    shade->body_program = program_build(gl, "body.vert", "body.frag", shadow->defines, fault);
     if (shade->body_program == 0) return false;
     shadow_samplers(gl, shade->body_program);
     shade->background_program =
@@ -96,7 +97,15 @@ static void place_lights(Shade* shade)
     shade->lights.extinction_per_m = EXTINCTION_PER_M;
 }
 
-bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault* fault)
+void shade_set_light(Shade* shade, float yaw_deg, float pitch_deg)
+{
+    shade->options.light_yaw_deg = yaw_deg;
+    shade->options.light_pitch_deg = pitch_deg;
+    place_lights(shade);
+}
+
+bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, const Shadow* shadow,
+                  Fault* fault)
 {
     memset(shade, 0, sizeof *shade);
     shade->options = *options;
@@ -104,7 +113,7 @@ bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault
     shade->samples = options->samples < limit ? options->samples : limit;
     place_lights(shade);
     gl->GenVertexArrays(1, &shade->vao);
-    if (create_multisampled(shade, gl, fault) && build_programs(shade, gl, fault) &&
+    if (create_multisampled(shade, gl, fault) && build_programs(shade, gl, shadow, fault) &&
         create_target(shade, gl, GL_RGBA16F, &shade->resolved, &shade->resolved_texture, fault) &&
         create_target(shade, gl, GL_RGBA8, &shade->output, &shade->output_texture, fault))
         return true;
@@ -137,7 +146,7 @@ static void draw_background(const Shade* shade, const Gl* gl)
     program_uniform3(gl, shade->background_program, "background_low", low);
     program_uniform3(gl, shade->background_program, "background_high", high);
     gl->Uniform1i(program_uniform(gl, shade->background_program, "coverage_only"),
-                  shade->options.view == VIEW_COVERAGE);
+                  shade->options.view != VIEW_SHADED);
     gl->Disable(GL_DEPTH_TEST);
     gl->BindVertexArray(shade->vao);
     gl->DrawArrays(GL_TRIANGLES, 0, 3);
@@ -163,6 +172,8 @@ static void use_program(const Shade* shade, const Gl* gl, GLuint program, const 
                   2.0f / camera->projection.m[1][1] / (float)shade->options.height);
     gl->Uniform1i(program_uniform(gl, program, "coverage_only"),
                   shade->options.view == VIEW_COVERAGE);
+    gl->Uniform1i(program_uniform(gl, program, "transmittance_only"),
+                  shade->options.view == VIEW_TRANSMITTANCE);
     shadow_bind(shadow, gl, program);
 }
 
@@ -177,6 +188,8 @@ static void resolve(const Shade* shade, const Gl* gl)
     gl->UseProgram(shade->resolve_program);
     gl->Uniform1i(program_uniform(gl, shade->resolve_program, "coverage_only"),
                   shade->options.view == VIEW_COVERAGE);
+    gl->Uniform1i(program_uniform(gl, shade->resolve_program, "transmittance_only"),
+                  shade->options.view == VIEW_TRANSMITTANCE);
     gl->ActiveTexture(GL_TEXTURE0);
     gl->BindTexture(GL_TEXTURE_2D, shade->resolved_texture);
     gl->BindVertexArray(shade->vao);

@@ -6,7 +6,7 @@
 #include "client/light.h"
 
 typedef enum Transparency { TRANSPARENCY_AUTO, TRANSPARENCY_TEST, TRANSPARENCY_HASH } Transparency;
-typedef enum ShadeView { VIEW_SHADED, VIEW_COVERAGE } ShadeView;
+typedef enum ShadeView { VIEW_SHADED, VIEW_COVERAGE, VIEW_TRANSMITTANCE } ShadeView;
 
 // Everything about a picture that stays from frame to frame.
 typedef struct ShadeOptions {
@@ -14,6 +14,7 @@ typedef struct ShadeOptions {
     int samples;               // 1, 2 or 4; lowered to what the driver has
     Transparency transparency; // auto: hash at 2 or more samples, test at 1
     ShadeView view;
+    ShadowOptions shadow;
     bool has_background;
     Vec3 background;                      // linear; without it a soft grey backdrop
     float light_yaw_deg, light_pitch_deg; // of the key light; fill and rim keep their places to it
@@ -31,7 +32,10 @@ typedef struct Shade {
 } Shade;
 
 ShadeOptions shade_default(void);
-bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault* fault);
+bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, const Shadow* shadow,
+                  Fault* fault);
+// Turns the key light; fill and rim keep their places to it.
+void shade_set_light(Shade* shade, float yaw_deg, float pitch_deg);
 void shade_free(Shade* shade, const Gl* gl);
 
 // Draws one picture of `hair`. Returns the draw calls made.

@@ -3,7 +3,7 @@
 in vec3 v_body, v_shine, v_place;
 flat in float v_random;
 in float v_fill;
-uniform int coverage_only;
+uniform int coverage_only, transmittance_only;
 
 layout(location = 0) out vec4 out_radiance; // a: 1 where there is hair
 
@@ -12,5 +12,6 @@ void main()
     float own = keep_covered(v_place, v_fill, v_random);
     float tone = 0.55 + 0.6 * own + 0.3 * fract(v_random * 37.0); // hairs differ, locks too
     out_radiance = vec4(v_body * tone + v_shine * (0.4 + 1.2 * own), 1.0);
+    if (transmittance_only != 0) out_radiance = vec4(v_body, 1.0);
     if (coverage_only != 0) out_radiance = vec4(1.0);
 }
