@@ -23,8 +23,9 @@ typedef struct Camera {
 // What all passes of one picture share. Axes are the world's, places relative to the head's.
 typedef struct Frame {
     Camera camera;
-    float rotation[9]; // of the head, row-major
-    Box bounds;        // what hair fills now
+    float rotation[9];           // of the head, row-major
+    Box bounds;                  // what hair fills now
+    float lit_low_m, lit_high_m; // ... and from where to where along the key light
 } Frame;
 
 CameraOptions camera_default(void);

@@ -19,9 +19,9 @@ bool draw_create(Drawing* drawing, const Gl* gl, const ShadeOptions* options,
     drawing->times = calloc(1, sizeof *drawing->times);
     drawing->fibres = fibres_create(gl, fault);
     if (drawing->times != NULL && drawing->fibres != 0 &&
-        shadow_create(&drawing->shadow, gl, drawing->fibres, fault) &&
-        light_create(&drawing->light, gl, &options->shading, fault) &&
-        shade_create(&drawing->shade, gl, options, fault))
+        shadow_create(&drawing->shadow, gl, &options->shadow, drawing->fibres, fault) &&
+        light_create(&drawing->light, gl, &options->shading, &drawing->shadow, fault) &&
+        shade_create(&drawing->shade, gl, options, &drawing->shadow, fault))
         return true;
     draw_free(drawing);
     return false;
@@ -55,16 +55,31 @@ bool draw_set_style(Drawing* drawing, const Hairstyle* style, uint64_t hash, int
     drawing->hair = hair;
     drawing->style_hash = hash;
     drawing->style_version = version;
-    drawing->has_style = drawing->fresh = true;
+    drawing->has_style = drawing->moved = true;
     return true;
 }
 
-// What the hair fills, head-relative world axes: the guides of the newest rows, widened by what
-// strands stray from them.
-static Box hair_bounds(const Drawing* drawing, const GuidesView* view, const float r[9])
+void draw_set_camera(Drawing* drawing, const CameraOptions* camera)
+{
+    drawing->camera = *camera;
+    drawing->looked = true;
+}
+
+void draw_set_light(Drawing* drawing, float yaw_deg, float pitch_deg)
+{
+    shade_set_light(&drawing->shade, yaw_deg, pitch_deg);
+    drawing->lit = true;
+}
+
+// What the hair fills, head-relative world axes and along the key light: the guides of the newest
+// rows, widened by what strands stray from them.
+static void find_bounds(const Drawing* drawing, const GuidesView* view, Frame* frame)
 {
     const Hairstyle* style = drawing->hair.style;
+    const float *r = frame->rotation, margin_m = 0.03f;
+    Vec3 key = drawing->shade.lights.key, margin = {margin_m, margin_m, margin_m};
     Box box = {vec3(1e9f, 1e9f, 1e9f), vec3(-1e9f, -1e9f, -1e9f)};
+    float low = 1e9f, high = -1e9f;
     for (int row = 0; row < style->guide_count; ++row) {
         int layer = view->row_tick[1][row] > view->row_tick[0][row];
         for (int n = 0; n < style->nodes; ++n) {
@@ -76,10 +91,13 @@ static Box hair_bounds(const Drawing* drawing, const GuidesView* view, const flo
                      r[6] * p.x + r[7] * p.y + r[8] * p.z);
             box.low = vec3_min(box.low, p);
             box.high = vec3_max(box.high, p);
+            low = fminf(low, vec3_dot(p, key));
+            high = fmaxf(high, vec3_dot(p, key));
         }
     }
-    Vec3 margin = {0.03f, 0.03f, 0.03f};
-    return (Box){vec3_sub(box.low, margin), vec3_add(box.high, margin)};
+    frame->bounds = (Box){vec3_sub(box.low, margin), vec3_add(box.high, margin)};
+    frame->lit_low_m = low - margin_m;
+    frame->lit_high_m = high + margin_m;
 }
 
 static int64_t begin_pass(const Drawing* drawing)
@@ -97,12 +115,13 @@ static void end_pass(Drawing* drawing, int pass, int64_t began_us)
 }
 
 // Puts hair in the order that its transparency wants, if any.
-static void sort_hair(Drawing* drawing, const GuidesView* view, const Frame* frame)
+static void sort_hair(Drawing* drawing, const GuidesView* view)
 {
     OrderBy by;
     bool far_first;
     if (!shade_sorts(&drawing->shade, &by, &far_first)) return;
     Hair* hair = &drawing->hair;
+    const Frame* frame = &drawing->frame;
     const float* r = frame->rotation;
     Vec3 e = frame->camera.eye; // world axes: back to the head's
     Vec3 eye = vec3(r[0] * e.x + r[3] * e.y + r[6] * e.z, r[1] * e.x + r[4] * e.y + r[7] * e.z,
@@ -110,47 +129,70 @@ static void sort_hair(Drawing* drawing, const GuidesView* view, const Frame* fra
     order_sort(&hair->order, drawing->gl, &hair->ribbons, hair->style, view, eye, by, far_first);
 }
 
+// What the picture to come is taken of; where the head turned, it moved.
+static void begin_frame(Drawing* drawing, const GuidesView* view)
+{
+    Frame* frame = &drawing->frame;
+    float aspect = (float)drawing->options.width / (float)drawing->options.height, rotation[9];
+    frame->camera = camera_orbit(&drawing->camera, drawing->hair.style, aspect);
+    quat_matrix(rotation, view->pose.orientation);
+    if (memcmp(frame->rotation, rotation, sizeof rotation) != 0) drawing->moved = true;
+    memcpy(frame->rotation, rotation, sizeof rotation);
+}
+
+static void run_shadow(Drawing* drawing, const GuidesView* view)
+{
+    int64_t began = begin_pass(drawing);
+    find_bounds(drawing, view, &drawing->frame);
+    drawing->draw_calls += shadow_run(&drawing->shadow, drawing->gl, &drawing->hair,
+                                      drawing->shade.lights.key, &drawing->frame);
+    end_pass(drawing, PASS_SHADOW, began);
+}
+
+static void run_shade(Drawing* drawing, const GuidesView* view)
+{
+    const Gl* gl = drawing->gl;
+    const Frame* frame = &drawing->frame;
+    int64_t began = begin_pass(drawing);
+    light_run(&drawing->light, gl, &drawing->hair, &drawing->shadow, &drawing->shade.lights, frame,
+              drawing->options.view == VIEW_TRANSMITTANCE);
+    end_pass(drawing, PASS_LIGHT, began);
+
+    began = begin_pass(drawing);
+    sort_hair(drawing, view);
+    drawing->draw_calls += 1 + shade_run(&drawing->shade, gl, &drawing->hair, &drawing->shadow,
+                                         &drawing->light, frame);
+    end_pass(drawing, PASS_SHADE, began);
+}
+
 bool draw_picture(Drawing* drawing, const GuidesView* view, Image* image)
 {
     if (!drawing->has_style) return false;
     const Gl* gl = drawing->gl;
     Hair* hair = &drawing->hair;
-    float aspect = (float)drawing->options.width / (float)drawing->options.height;
     ++drawing->frames;
 
     int64_t began = begin_pass(drawing);
     int64_t bytes = hair->guides.bytes;
-    bool moved = upload_rows(&hair->guides, gl, view);
+    if (upload_rows(&hair->guides, gl, view)) drawing->moved = true;
     drawing->uploaded_bytes += hair->guides.bytes - bytes;
-    if (!moved && !drawing->fresh) return true;
+    if (!drawing->moved && !drawing->lit && !drawing->looked) return true;
     end_pass(drawing, PASS_UPLOAD, began);
 
-    began = begin_pass(drawing);
-    update_run(&hair->update, gl, &hair->guides, 1.0f);
-    end_pass(drawing, PASS_UPDATE, began);
-
-    began = begin_pass(drawing);
-    Frame frame = {.camera = camera_orbit(&drawing->camera, hair->style, aspect)};
-    quat_matrix(frame.rotation, view->pose.orientation);
-    frame.bounds = hair_bounds(drawing, view, frame.rotation);
-    drawing->draw_calls +=
-        shadow_run(&drawing->shadow, gl, hair, drawing->shade.lights.key, &frame);
-    end_pass(drawing, PASS_SHADOW, began);
-
-    began = begin_pass(drawing);
-    light_run(&drawing->light, gl, hair, &drawing->shadow, &drawing->shade.lights, &frame);
-    end_pass(drawing, PASS_LIGHT, began);
-
-    began = begin_pass(drawing);
-    sort_hair(drawing, view, &frame);
-    drawing->draw_calls +=
-        2 + shade_run(&drawing->shade, gl, hair, &drawing->shadow, &drawing->light, &frame);
-    end_pass(drawing, PASS_SHADE, began);
+    begin_frame(drawing, view);
+    if (drawing->moved) {
+        began = begin_pass(drawing);
+        update_run(&hair->update, gl, &hair->guides, 1.0f);
+        ++drawing->draw_calls;
+        end_pass(drawing, PASS_UPDATE, began);
+    }
+    if (drawing->moved || drawing->lit) run_shadow(drawing, view);
+    run_shade(drawing, view);
 
     began = begin_pass(drawing);
     shade_read(&drawing->shade, gl, image);
     end_pass(drawing, PASS_READ, began);
-    drawing->fresh = false;
+    drawing->moved = drawing->lit = drawing->looked = false;
     return true;
 }
 

@@ -26,7 +26,9 @@ typedef struct Drawing {
     Hair hair;
     uint64_t style_hash;
     int style_version;
-    bool has_style, fresh; // fresh: something moved since the last picture
+    bool has_style;
+    bool moved, lit, looked; // guides or pose; the key light; the camera: since the last picture
+    Frame frame;             // of the last picture
     int64_t uploaded_bytes;
     int64_t draw_calls;
     int64_t frames;
@@ -42,8 +44,13 @@ void draw_free(Drawing* drawing);
 bool draw_set_style(Drawing* drawing, const Hairstyle* style, uint64_t hash, int version,
                     Fault* fault);
 
-// Draws the newest state of `view` into `image`. Nothing new: nothing is uploaded, updated,
-// shadowed or shaded again, and `image` keeps what it has. False where there is no style yet.
+// Looks from elsewhere, and turns the key light, from the next picture on.
+void draw_set_camera(Drawing* drawing, const CameraOptions* camera);
+void draw_set_light(Drawing* drawing, float yaw_deg, float pitch_deg);
+
+// Draws the newest state of `view` into `image`. What did not move is not done again: no guides, no
+// upload and no update; neither guides, head nor light, no shadows; nothing at all, no picture, and
+// `image` keeps what it has. False where there is no style yet.
 bool draw_picture(Drawing* drawing, const GuidesView* view, Image* image);
 
 // Sum of hair coverage over a picture: its alpha channel, in pixels.

@@ -16,6 +16,7 @@
 #define GL_VOID_FUNCTIONS(X) \
     X(void, Enable, (GLenum cap)) \
     X(void, Disable, (GLenum cap)) \
+    X(void, BlendFunc, (GLenum sfactor, GLenum dfactor)) \
     X(void, Clear, (GLbitfield mask)) \
     X(void, ClearColor, (GLfloat red, GLfloat green, GLfloat blue, GLfloat alpha)) \
     X(void, ClearDepth, (GLdouble depth)) \
@@ -48,6 +49,7 @@
     X(void, DeleteFramebuffers, (GLsizei n, const GLuint* framebuffers)) \
     X(void, BindFramebuffer, (GLenum target, GLuint framebuffer)) \
     X(void, FramebufferTexture2D, (GLenum target, GLenum attachment, GLenum textarget, GLuint texture, GLint level)) \
+    X(void, FramebufferTextureLayer, (GLenum target, GLenum attachment, GLuint texture, GLint level, GLint layer)) \
     X(void, FramebufferRenderbuffer, (GLenum target, GLenum attachment, GLenum renderbuffertarget, GLuint renderbuffer)) \
     X(void, BlitFramebuffer, (GLint srcX0, GLint srcY0, GLint srcX1, GLint srcY1, GLint dstX0, GLint dstY0, GLint dstX1, GLint dstY1, GLbitfield mask, GLenum filter)) \
     X(void, DrawBuffers, (GLsizei n, const GLenum* bufs)) \
@@ -85,6 +87,7 @@
     X(void, Uniform1i, (GLint location, GLint v0)) \
     X(void, Uniform1f, (GLint location, GLfloat v0)) \
     X(void, Uniform3f, (GLint location, GLfloat v0, GLfloat v1, GLfloat v2)) \
+    X(void, Uniform1fv, (GLint location, GLsizei count, const GLfloat* value)) \
     X(void, Uniform1uiv, (GLint location, GLsizei count, const GLuint* value)) \
     X(void, Uniform3fv, (GLint location, GLsizei count, const GLfloat* value)) \
     X(void, Uniform4fv, (GLint location, GLsizei count, const GLfloat* value)) \

@@ -4,11 +4,13 @@
 
 #include <string.h>
 
-bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, Fault* fault)
+bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, const Shadow* shadow,
+                  Fault* fault)
 {
     memset(light, 0, sizeof *light);
-    char defines[SHADING_DEFINES_BYTES];
+    char defines[SHADING_DEFINES_BYTES + SHADOW_DEFINES_BYTES];
     shading_defines(shading, defines);
+    strcat(defines, shadow->defines);
     if (!shading_create(&light->shading, gl, shading, fault)) return false;
     light->program = program_build(gl, "fullscreen.vert", "light.frag", defines, fault);
     if (light->program == 0) return false;
@@ -94,7 +96,7 @@ void light_show(const Light* light, const Gl* gl)
 }
 
 void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
-               const Lights* lights, const Frame* frame)
+               const Lights* lights, const Frame* frame, bool transmittance)
 {
     shading_update(&light->shading, gl, &hair->material);
     gl->BindFramebuffer(GL_FRAMEBUFFER, light->framebuffer);
@@ -106,6 +108,7 @@ void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shado
     program_uniform3(gl, light->program, "eye", frame->camera.eye);
     program_uniform3(gl, light->program, "root_colour", hair->material.root_colour);
     program_uniform3(gl, light->program, "tip_colour", hair->material.tip_colour);
+    gl->Uniform1i(program_uniform(gl, light->program, "transmittance_only"), transmittance);
     lights_bind(lights, gl, light->program);
     shadow_bind(shadow, gl, light->program);
     shading_bind(&light->shading, gl, light->program);

@@ -28,7 +28,8 @@ typedef struct Light {
     int rows;
 } Light;
 
-bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, Fault* fault);
+bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, const Shadow* shadow,
+                  Fault* fault);
 void light_free(Light* light, const Gl* gl);
 // Makes room for a style's points. False with a fault, and then there is room as before.
 bool light_fit(Light* light, const Gl* gl, const Update* update, Fault* fault);
@@ -40,5 +41,6 @@ void lights_bind(const Lights* lights, const Gl* gl, GLuint program);
 void light_samplers(const Gl* gl, GLuint program);
 void light_show(const Light* light, const Gl* gl);
 
+// `transmittance`: instead, how much of the key light arrives.
 void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
-               const Lights* lights, const Frame* frame);
+               const Lights* lights, const Frame* frame, bool transmittance);

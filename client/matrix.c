@@ -33,9 +33,9 @@ Mat4 matrix_perspective(float fov_rad, float aspect, float near_m, float far_m)
     return from(glms_perspective(fov_rad, aspect, near_m, far_m));
 }
 
-Mat4 matrix_ortho(float radius_m)
+Mat4 matrix_ortho(float radius_m, float depth_m)
 {
-    return from(glms_ortho(-radius_m, radius_m, -radius_m, radius_m, 0.0f, 2.0f * radius_m));
+    return from(glms_ortho(-radius_m, radius_m, -radius_m, radius_m, 0.0f, depth_m));
 }
 
 Mat4 matrix_mul(const Mat4* a, const Mat4* b)

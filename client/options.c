@@ -33,6 +33,9 @@ enum {
     KEY_PRE_Z,
     KEY_SORT,
     KEY_VIEW,
+    KEY_SHADOWS,
+    KEY_SHADOW_SIZE,
+    KEY_SHADOW_LAYERS,
     KEY_TICK,
     KEY_TICKS,
     KEY_EPOCH,
@@ -84,7 +87,14 @@ static const struct argp_option arguments[] = {
      "by distance, each picture: off, wisps or segments (default for blend, from back to front; "
      "others are sorted from front to back)",
      0},
-    {"view", KEY_VIEW, "NAME", 0, "shaded (default) or coverage: hair as linear grey", 0},
+    {"view", KEY_VIEW, "NAME", 0,
+     "shaded (default); coverage: hair as linear grey; transmittance: how much key light arrives",
+     0},
+    {"shadows", KEY_SHADOWS, "NAME", 0, "none, depth (default), opacity or deep", 0},
+    {"shadow-size", KEY_SHADOW_SIZE, "N", 0, "texels across a shadow map: 64 to 1024 (default 512)",
+     0},
+    {"shadow-layers", KEY_SHADOW_LAYERS, "N", 0,
+     "planes of optical depth: 4 to 128 (opacity, default 16), 2 to 8 (deep, default 4)", 0},
     {0, 0, 0, 0, "Which ticks", 3},
     {"tick", KEY_TICK, "N", 0, "draw exactly tick N (log, embedded)", 0},
     {"ticks", KEY_TICKS, "A:B[:STEP]", 0,
@@ -266,13 +276,40 @@ static error_t parse_source(int key, char* value, struct argp_state* state, Opti
     return 0;
 }
 
+static void parse_shadow_method(struct argp_state* state, const char* value, ShadowOptions* shadow)
+{
+    const char* names[16] = {NULL};
+    for (int i = 0; shadow_methods[i].name != NULL && i < 15; ++i)
+        names[i] = shadow_methods[i].name;
+    shadow->method = choice(state, "shadows", value, names);
+}
+
+static error_t parse_shadow(int key, char* value, struct argp_state* state, ShadowOptions* shadow)
+{
+    switch (key) {
+    case KEY_SHADOWS:
+        parse_shadow_method(state, value, shadow);
+        break;
+    case KEY_SHADOW_SIZE:
+        shadow->size =
+            (int)integer(state, "shadow-size", value, SHADOW_LEAST_SIZE, SHADOW_MOST_SIZE);
+        break;
+    case KEY_SHADOW_LAYERS:
+        shadow->layers = (int)integer(state, "shadow-layers", value, 1, SHADOW_MAX_LAYERS);
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
 static error_t parse_picture(int key, char* value, struct argp_state* state, Options* options)
 {
     static const char* const backends[] = {"auto", "egl", "osmesa", "null", NULL};
     static const char* const transparencies[] = {"test", "coverage", "hash", "blend", NULL};
     static const char* const switches[] = {"on", "off", NULL};
     static const char* const sorts[] = {"off", "wisps", "segments", NULL};
-    static const char* const views[] = {"shaded", "coverage", NULL};
+    static const char* const views[] = {"shaded", "coverage", "transmittance", NULL};
     ShadeOptions* shade = &options->shade;
     CameraOptions* camera = &options->camera;
     Fault fault = {""};
@@ -339,10 +376,10 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         shade->sort = SORT_OFF + (ShadeSort)choice(state, "sort", value, sorts);
         break;
     case KEY_VIEW:
-        shade->view = choice(state, "view", value, views) ? VIEW_COVERAGE : VIEW_SHADED;
+        shade->view = (ShadeView)choice(state, "view", value, views);
         break;
     default:
-        return ARGP_ERR_UNKNOWN;
+        return parse_shadow(key, value, state, &shade->shadow);
     }
     return 0;
 }
@@ -386,9 +423,21 @@ static void check_files(struct argp_state* state, const Options* options)
         argp_error(state, "--stats %s: would replace what --out writes", options->stats);
 }
 
+static void check_shadow(struct argp_state* state, const ShadowOptions* shadow)
+{
+    const ShadowMethod* method = &shadow_methods[shadow->method];
+    if (shadow->layers == 0) return;
+    if (method->most_layers == 0)
+        argp_error(state, "--shadow-layers: --shadows %s has none", method->name);
+    if (shadow->layers < method->least_layers || shadow->layers > method->most_layers)
+        argp_error(state, "--shadow-layers %d: --shadows %s takes %d to %d", shadow->layers,
+                   method->name, method->least_layers, method->most_layers);
+}
+
 static void check(struct argp_state* state, const Options* options)
 {
     check_files(state, options);
+    check_shadow(state, &options->shade.shadow);
     if ((options->log != NULL) + options->embedded + (options->url != NULL) > 1)
         argp_error(state, "choose one of --url, --log and --embedded");
     bool daemon_options =

@@ -11,16 +11,19 @@
 // GLSL text under construction for one shader.
 typedef struct Builder {
     const ShaderSource* sources;
+    const char* defines; // may be NULL
     bool included[MAX_SOURCES];
     char* text;
     size_t length, capacity;
     bool short_of_memory;
 } Builder;
 
+// By its name, or by its name without `.glsl`: GLSL knows no strings that a define could hold.
 static int find_source(const ShaderSource* sources, const char* name, size_t length)
 {
     for (int i = 0; i < MAX_SOURCES && sources[i].name; i++)
-        if (strlen(sources[i].name) == length && memcmp(sources[i].name, name, length) == 0)
+        if (strncmp(sources[i].name, name, length) == 0 &&
+            (sources[i].name[length] == '\0' || strcmp(sources[i].name + length, ".glsl") == 0))
             return i;
     return -1;
 }
@@ -63,15 +66,32 @@ static const char* skip_blanks(const char* at)
     return at;
 }
 
-// The name between the quotes of an `#include "name"` line, or NULL.
-static const char* included_name(const char* line, size_t* length)
+// What `#define NAME value` in `defines` makes of a name, or the name itself where there is no such
+// line.
+static const char* defined_value(const char* defines, const char* name, size_t* length)
+{
+    const size_t name_length = strcspn(name, " \t\n");
+    *length = name_length;
+    for (const char* at = defines; at && *at; at += strcspn(at, "\n"), at += *at == '\n') {
+        if (strncmp(at, "#define ", 8) != 0 || strncmp(at + 8, name, name_length) != 0) continue;
+        if (at[8 + name_length] != ' ') continue;
+        const char* value = skip_blanks(at + 8 + name_length);
+        *length = strcspn(value, " \t\n");
+        return value;
+    }
+    return name;
+}
+
+// The name between the quotes of an `#include "name"` line, or what NAME of `#include NAME` is
+// defined as; NULL where the line is another.
+static const char* included_name(const char* defines, const char* line, size_t* length)
 {
     const char* at = skip_blanks(line);
     if (*at != '#') return NULL;
     at = skip_blanks(at + 1);
     if (strncmp(at, "include", 7) != 0) return NULL;
     at = skip_blanks(at + 7);
-    if (*at != '"') return NULL;
+    if (*at != '"') return defined_value(defines, at, length);
     *length = strcspn(at + 1, "\"\n");
     return at[1 + *length] == '"' ? at + 1 : NULL;
 }
@@ -99,7 +119,7 @@ static bool append_source(Builder* builder, int source, Fault* fault)
     for (const char* at = builder->sources[source].text; *at; line++) {
         size_t length = strcspn(at, "\n");
         size_t name_length;
-        const char* name = included_name(at, &name_length);
+        const char* name = included_name(builder->defines, at, &name_length);
         if (name) {
             if (!append_include(builder, source, line, name, name_length, fault)) return false;
         } else {
@@ -192,7 +212,7 @@ static bool build_text(Builder* builder, const char* name, const char* defines, 
 static GLuint build_shader(const Gl* gl, GLenum type, const ShaderSource* sources, const char* name,
                            const char* defines, Fault* fault)
 {
-    Builder builder = {.sources = sources};
+    Builder builder = {.sources = sources, .defines = defines};
     GLuint shader = 0;
     if (build_text(&builder, name, defines, fault)) {
         shader = gl->CreateShader(type);

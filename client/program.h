@@ -15,8 +15,9 @@ extern const ShaderSource shader_sources[]; // ended by {0, 0}
 // Compiles and links two shader files. Each text is preceded by `#version 330 core`, the
 // extension for gl_SampleMask, and `defines` (lines "#define X 1\n"; may be NULL), so files carry
 // none of these. A line `#include "name"` is replaced by that file, once per shader: a second
-// include of the same name is empty, so that parts may include what they need. 0 with a fault that
-// names file, line and the driver's words.
+// include of the same name is empty, so that parts may include what they need. `#include X` takes
+// the file that `defines` names without its `.glsl` ("#define X file\n"). 0 with a fault that names
+// file, line and the driver's words.
 GLuint program_build(const Gl* gl, const char* vertex_name, const char* fragment_name,
                      const char* defines, Fault* fault);
 

@@ -17,6 +17,7 @@ ShadeOptions shade_default(void)
                           .shading = shading_default(),
                           // The three lights of a photographer, 3 : 0.6 : 2.
                           .light_strength = {3.0f, 0.6f, 2.0f, 0.25f},
+                          .shadow = shadow_default(),
                           .light_yaw_deg = 40.0f,
                           .light_pitch_deg = 45.0f};
 }
@@ -78,7 +79,7 @@ static GLuint build_hair(const Shade* shade, const Gl* gl, TransparencyStep step
     return program;
 }
 
-static bool build_programs(Shade* shade, const Gl* gl, Fault* fault)
+static bool build_programs(Shade* shade, const Gl* gl, const Shadow* shadow, Fault* fault)
 {
     bool pre_z = shade->options.pre_z;
     shade->transparency = transparency_choose(shade->options.transparency, shade->samples);
@@ -86,9 +87,10 @@ static bool build_programs(Shade* shade, const Gl* gl, Fault* fault)
     if (shade->hair_program == 0) return false;
     if (pre_z) shade->depth_program = build_hair(shade, gl, STEP_DEPTH, fault);
     if (pre_z && shade->depth_program == 0) return false;
-    char shading[SHADING_DEFINES_BYTES];
-    shading_defines(&shade->options.shading, shading);
-    shade->body_program = program_build(gl, "body.vert", "body.frag", shading, fault);
+    char defines[SHADING_DEFINES_BYTES + SHADOW_DEFINES_BYTES];
+    shading_defines(&shade->options.shading, defines);
+    strcat(defines, shadow->defines);
+    shade->body_program = program_build(gl, "body.vert", "body.frag", defines, fault);
     if (shade->body_program == 0) return false;
     shading_samplers(gl, shade->body_program);
     shadow_samplers(gl, shade->body_program);
@@ -111,7 +113,15 @@ static void place_lights(Shade* shade)
     shade->lights.extinction_per_m = EXTINCTION_PER_M;
 }
 
-bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault* fault)
+void shade_set_light(Shade* shade, float yaw_deg, float pitch_deg)
+{
+    shade->options.light_yaw_deg = yaw_deg;
+    shade->options.light_pitch_deg = pitch_deg;
+    place_lights(shade);
+}
+
+bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, const Shadow* shadow,
+                  Fault* fault)
 {
     memset(shade, 0, sizeof *shade);
     shade->options = *options;
@@ -119,7 +129,7 @@ bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault
     shade->samples = options->samples < limit ? options->samples : limit;
     place_lights(shade);
     gl->GenVertexArrays(1, &shade->vao);
-    if (create_multisampled(shade, gl, fault) && build_programs(shade, gl, fault) &&
+    if (create_multisampled(shade, gl, fault) && build_programs(shade, gl, shadow, fault) &&
         create_target(shade, gl, GL_RGBA16F, &shade->resolved, &shade->resolved_texture, fault) &&
         create_target(shade, gl, GL_RGBA8, &shade->output, &shade->output_texture, fault))
         return true;
@@ -153,7 +163,7 @@ static void draw_background(const Shade* shade, const Gl* gl)
     program_uniform3(gl, shade->background_program, "background_low", low);
     program_uniform3(gl, shade->background_program, "background_high", high);
     gl->Uniform1i(program_uniform(gl, shade->background_program, "coverage_only"),
-                  shade->options.view == VIEW_COVERAGE);
+                  shade->options.view != VIEW_SHADED);
     gl->Disable(GL_DEPTH_TEST);
     gl->BindVertexArray(shade->vao);
     gl->DrawArrays(GL_TRIANGLES, 0, 3);
@@ -179,6 +189,8 @@ static void use_program(const Shade* shade, const Gl* gl, GLuint program, const 
                   2.0f / camera->projection.m[1][1] / (float)shade->options.height);
     gl->Uniform1i(program_uniform(gl, program, "coverage_only"),
                   shade->options.view == VIEW_COVERAGE);
+    gl->Uniform1i(program_uniform(gl, program, "transmittance_only"),
+                  shade->options.view == VIEW_TRANSMITTANCE);
     shadow_bind(shadow, gl, program);
 }
 
@@ -193,6 +205,8 @@ static void resolve(const Shade* shade, const Gl* gl)
     gl->UseProgram(shade->resolve_program);
     gl->Uniform1i(program_uniform(gl, shade->resolve_program, "coverage_only"),
                   shade->options.view == VIEW_COVERAGE);
+    gl->Uniform1i(program_uniform(gl, shade->resolve_program, "transmittance_only"),
+                  shade->options.view == VIEW_TRANSMITTANCE);
     gl->ActiveTexture(GL_TEXTURE0);
     gl->BindTexture(GL_TEXTURE_2D, shade->resolved_texture);
     gl->BindVertexArray(shade->vao);

@@ -7,7 +7,7 @@
 #include "client/transparency.h"
 
 typedef enum ShadeSort { SORT_AUTO, SORT_OFF, SORT_WISPS, SORT_SEGMENTS } ShadeSort;
-typedef enum ShadeView { VIEW_SHADED, VIEW_COVERAGE } ShadeView;
+typedef enum ShadeView { VIEW_SHADED, VIEW_COVERAGE, VIEW_TRANSMITTANCE } ShadeView;
 
 // Everything about a picture that stays from frame to frame.
 typedef struct ShadeOptions {
@@ -20,6 +20,7 @@ typedef struct ShadeOptions {
     ShadingOptions shading;
     bool has_colour; // of hair, instead of the style's
     int colour;      // shading_colour
+    ShadowOptions shadow;
     bool has_background;
     Vec3 background;                      // linear; without it a soft grey backdrop
     float light_yaw_deg, light_pitch_deg; // of the key light; fill and rim keep their places to it
@@ -40,7 +41,10 @@ typedef struct Shade {
 } Shade;
 
 ShadeOptions shade_default(void);
-bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, Fault* fault);
+bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, const Shadow* shadow,
+                  Fault* fault);
+// Turns the key light; fill and rim keep their places to it.
+void shade_set_light(Shade* shade, float yaw_deg, float pitch_deg);
 void shade_free(Shade* shade, const Gl* gl);
 
 // Whether hair must be sorted before a picture, by what, and which comes first.

@@ -8,7 +8,7 @@ in vec3 v_position, v_normal, v_tangent;
 in vec4 v_albedo;
 uniform vec3 eye;
 uniform vec3 root_colour;
-uniform int coverage_only;
+uniform int coverage_only, transmittance_only;
 
 layout(location = 0) out vec4 out_radiance;
 
@@ -27,6 +27,10 @@ void main()
     }
     vec3 normal = normalize(v_normal), view = normalize(eye - v_position);
     float lit = skin_lit(v_position, normal);
+    if (transmittance_only != 0) {
+        out_radiance = vec4(vec3(lit), 0.0);
+        return;
+    }
     vec3 skin = KEY * lit * lambert(normal, key_direction, v_albedo.rgb) +
                 FILL * lambert(normal, fill_direction, v_albedo.rgb) +
                 RIM * lambert(normal, rim_direction, v_albedo.rgb) +

@@ -6,6 +6,7 @@ uniform sampler2D drawn_positions, drawn_normals, drawn_tangents;
 uniform mat3 head_rotation;
 uniform vec3 eye; // relative to the head's position, world axes
 uniform vec3 root_colour, tip_colour;
+uniform int transmittance_only;
 
 layout(location = 0) out vec4 out_body;  // scales with the hair's own tone
 layout(location = 1) out vec4 out_shine; // first highlight
@@ -27,4 +28,8 @@ void main()
     sum = added(sum, scaled(strand_shade(strand, rim_direction, view), RIM * open));
     out_body = vec4(sum.body + SKY * open * (0.6 + 0.4 * normal.y) * strand.colour, 1.0);
     out_shine = vec4(sum.shine, 1.0);
+    if (transmittance_only != 0) {
+        out_body = vec4(vec3(hair_lit(position)), 1.0);
+        out_shine = vec4(0.0);
+    }
 }

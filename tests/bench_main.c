@@ -328,6 +328,7 @@ static const Study studies[] = {
     {"accuracy", "errors against two truths over the clips, with the cost of each", study_accuracy},
     {"stability", "where the models fail: boundaries measured and derived, eleven maps",
      study_stability},
+    {"shadow", "error and time of shadow methods by layers, resolution, triangles", study_shadow},
     {"tree", "what the Adaptive Wisp Tree saves and what it gets wrong", study_tree},
     {"reference", "our pictures against path-traced ones of the same strands (../shared/assets)",
      study_reference},

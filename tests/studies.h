@@ -17,6 +17,7 @@ bool study_stability(Fault* fault);
 bool study_tree(Fault* fault);
 bool study_reference(Fault* fault);
 bool study_shading(Fault* fault);
+bool study_shadow(Fault* fault);
 
 // "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.
 void study_machine(void);

@@ -108,7 +108,7 @@ static bool draw(Image* image, const Scene* scene, const View* view, const Shade
     drawing.timed = ms != NULL;
     bool drawn = draw_set_style(&drawing, scene->style, 1, 0, fault);
     for (int i = 0; drawn && i < (ms != NULL ? 1 + FRAMES : 1); ++i) {
-        drawing.fresh = true;
+        drawing.moved = true;
         drawn = draw_picture(&drawing, &scene->guides, image);
     }
     if (ms != NULL) *ms = median_ms(drawing.times);
@@ -305,10 +305,16 @@ typedef struct Method {
 } Method;
 
 static const Method methods[] = {
+    {"clay", "none", SHADING_CLAY},
     {"clay", "depth", SHADING_CLAY},
-    {"kajiya", "depth", SHADING_KAJIYA},
-    {"banks", "depth", SHADING_BANKS},
+    {"clay", "opacity", SHADING_CLAY},
+    {"clay", "deep", SHADING_CLAY},
+    {"kajiya", "deep", SHADING_KAJIYA},
+    {"banks", "deep", SHADING_BANKS},
+    {"marschner", "none", SHADING_MARSCHNER},
     {"marschner", "depth", SHADING_MARSCHNER},
+    {"marschner", "opacity", SHADING_MARSCHNER},
+    {"marschner", "deep", SHADING_MARSCHNER},
 };
 
 // Everything that a row of the CSV is made from.
@@ -342,6 +348,7 @@ static bool draw_pair(Pair* pair, const Scene* scene, const View* view, Fault* f
     Vec3 albedo;
     ShadeOptions options = picture_options(pair->picture, &albedo);
     options.shading.kind = pair->method->kind;
+    options.shadow.method = shadow_find_method(pair->method->shadows);
     scene->style->material.root_colour = scene->style->material.tip_colour = albedo;
     if (!draw(pair->ours, scene, view, &options, &pair->ms, fault)) return false;
     print_colour(pair);

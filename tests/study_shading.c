@@ -154,8 +154,9 @@ static bool open_scene(Scene* scene, const Gl* gl, Fault* fault)
     scene->style->set_count = 1;
     scene->fibres = fibres_create(gl, fault);
     GuidesView view;
+    ShadowOptions shadow = shadow_default();
     if (scene->fibres == 0 || !hair_create(&scene->hair, gl, scene->style, fault) ||
-        !shadow_create(&scene->shadow, gl, scene->fibres, fault) ||
+        !shadow_create(&scene->shadow, gl, &shadow, scene->fibres, fault) ||
         !guides_view_init(&view, 0, fault))
         return false;
     upload_rows(&scene->hair.guides, gl, &view); // nothing has come: hair at rest
@@ -191,7 +192,7 @@ static void time_light(const Gl* gl, Scene* scene, Light* light, Case* one)
 {
     gl->Finish();
     int64_t began = base_monotonic_us();
-    light_run(light, gl, &scene->hair, &scene->shadow, &scene->lights, &scene->frame);
+    light_run(light, gl, &scene->hair, &scene->shadow, &scene->lights, &scene->frame, false);
     gl->Finish();
     one->light_ms = least(one->light_ms, (double)(base_monotonic_us() - began) * 1e-3);
 }
@@ -215,7 +216,7 @@ static bool measure_times(Cases* cases, Fault* fault)
     const Gl* gl = cases->gl;
     bool done = open_scene(&scene, gl, fault);
     for (int i = 0; i < cases->count && done; ++i)
-        done = light_create(&lights[i], gl, &cases->all[i].options, fault) &&
+        done = light_create(&lights[i], gl, &cases->all[i].options, &scene.shadow, fault) &&
                light_fit(&lights[i], gl, &scene.hair.update, fault);
     for (int round = 0; round < ROUNDS && done; ++round)
         for (int i = 0; i < cases->count; ++i) {

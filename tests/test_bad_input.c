@@ -64,6 +64,12 @@ static void unknown_options_and_values_are_wrong_usage(void** state)
     expect_refused(&stage, 2, "--size", "12", ARGS(CLIENT, "--size", "12"));
     // Numbers that are right but for what does not fit 32 bits.
     expect_refused(&stage, 2, "--size", "8192", ARGS(CLIENT, "--size", "4294967360x48"));
+    expect_refused(&stage, 2, "--shadows", "opacity", ARGS(CLIENT, "--shadows", "soft"));
+    expect_refused(&stage, 2, "--shadow-size", "1024", ARGS(CLIENT, "--shadow-size", "32"));
+    expect_refused(&stage, 2, "--shadow-layers", "none",
+                   ARGS(CLIENT, "--shadows", "depth", "--shadow-layers", "4"));
+    expect_refused(&stage, 2, "--shadow-layers 16", "2 to 8",
+                   ARGS(CLIENT, "--shadow-layers", "16", "--shadows", "deep"));
     expect_refused(&stage, 2, "--ticks", "A:B",
                    ARGS(CLIENT, "--embedded", "--ticks", "0:4294967297"));
     expect_refused(&stage, 2, "--motion", "shake", ARGS(SERVER, "--motion", "jumping"));

@@ -222,6 +222,86 @@ static void draw_calls_are_the_calls_made(void** state)
     stage_close(&stage);
 }
 
+// The passes of a picture, by their draw calls: update 1, shadow 2, light 1, shade 4.
+static void shadows_stay_while_only_the_camera_moves(void** state)
+{
+    (void)state;
+    Stage stage;
+    assert_true(
+        stage_open(&stage, "null", long_hair, small_picture(VIEW_SHADED), camera_default()));
+    drawing_put_tick(&stage.view, long_hair, 0, 0, 0.0f);
+    must_draw(&stage);
+    assert_int_equal(stage.drawing.draw_calls, 8);
+    CameraOptions camera = camera_default();
+    camera.yaw_deg = 80;
+    draw_set_camera(&stage.drawing, &camera);
+    must_draw(&stage);
+    assert_int_equal(stage.drawing.draw_calls, 8 + 5);
+    draw_set_light(&stage.drawing, 10, 20);
+    must_draw(&stage);
+    assert_int_equal(stage.drawing.draw_calls, 8 + 5 + 7);
+    must_draw(&stage);
+    assert_int_equal(stage.drawing.draw_calls, 8 + 5 + 7);
+    stage.view.pose.orientation = quat_normalise((Quat){0, 0.3, 0, 1});
+    drawing_put_tick(&stage.view, long_hair, 1, 0, 0.0f);
+    must_draw(&stage);
+    assert_int_equal(stage.drawing.draw_calls, 8 + 5 + 7 + 8);
+    stage_close(&stage);
+}
+
+// What moves piece by piece is what was there from the start.
+static void a_camera_and_a_light_that_moved_draw_as_if_they_had_stood_there(void** state)
+{
+    (void)state;
+    ShadeOptions options = small_picture(VIEW_SHADED);
+    CameraOptions there = camera_default();
+    there.yaw_deg = 200;
+    Stage moved = open_any(bob, VIEW_SHADED), stood;
+    drawing_put_tick(&moved.view, bob, 0, 0, 0.0f);
+    must_draw(&moved);
+    draw_set_camera(&moved.drawing, &there);
+    must_draw(&moved);
+    draw_set_light(&moved.drawing, 170, 30);
+    must_draw(&moved);
+    options.light_yaw_deg = 170;
+    options.light_pitch_deg = 30;
+    assert_true(stage_open(&stood, moved.gl->backend, bob, options, there));
+    drawing_put_tick(&stood.view, bob, 0, 0, 0.0f);
+    must_draw(&stood);
+    assert_memory_equal(moved.image.rgba, stood.image.rgba, BYTES);
+    stage_close(&stood);
+    assert_true(gl_make_current(moved.gl));
+    stage_close(&moved);
+}
+
+// Grey is the share of key light that arrives; without shadows all of it does.
+static void transmittance_view_shows_the_share_of_light_that_arrives(void** state)
+{
+    (void)state;
+    const char* const methods[] = {"none", "depth", "opacity", "deep"};
+    for (int m = 0; m < 4; ++m) {
+        Stage stage;
+        ShadeOptions options = small_picture(VIEW_TRANSMITTANCE);
+        options.shadow.method = shadow_find_method(methods[m]);
+        if (!stage_open(&stage, "egl", long_hair, options, camera_default()) &&
+            !stage_open(&stage, "osmesa", long_hair, options, camera_default()))
+            skip();
+        drawing_put_tick(&stage.view, long_hair, 0, 0, 0.0f);
+        must_draw(&stage);
+        int full = 0, part = 0, none = 0;
+        for (int i = 0; i < WIDTH * HEIGHT; ++i) {
+            const uint8_t* c = stage.image.rgba + 4 * i;
+            assert_true(c[0] == c[1] && c[1] == c[2]);
+            if (c[3] != 255) continue; // all hair
+            full += c[0] == 255, part += c[0] > 0 && c[0] < 255, none += c[0] == 0;
+        }
+        printf("%s: of hair pixels %d in full light, %d in part, %d in none\n", methods[m], full,
+               part, none);
+        assert_true(m == 0 ? full > 100 && part == 0 && none == 0 : part > 100);
+        stage_close(&stage);
+    }
+}
+
 static void nothing_is_drawn_before_there_is_a_style(void** state)
 {
     (void)state;
@@ -632,6 +712,9 @@ int main(void)
         cmocka_unit_test(a_new_tick_uploads_12_bytes_a_node_and_nothing_else_does),
         cmocka_unit_test(one_new_row_uploads_one_row),
         cmocka_unit_test(draw_calls_are_the_calls_made),
+        cmocka_unit_test(shadows_stay_while_only_the_camera_moves),
+        cmocka_unit_test(a_camera_and_a_light_that_moved_draw_as_if_they_had_stood_there),
+        cmocka_unit_test(transmittance_view_shows_the_share_of_light_that_arrives),
         cmocka_unit_test(nothing_is_drawn_before_there_is_a_style),
         cmocka_unit_test(egl_and_osmesa_draw_the_same_picture),
         cmocka_unit_test(another_tick_or_pose_is_another_picture),

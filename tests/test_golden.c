@@ -145,7 +145,7 @@ static void expect_rejected(const GoldenScene* scene)
 {
     Fault fault = {""};
     is_drawn = NULL; // as it is
-    golden.drawing.fresh = true;
+    golden.drawing.moved = true;
     if (!golden_draw(&golden, &fault)) fail_msg("%s", fault.text);
     Comparison is = compare_with_approved(scene);
     if (golden_is_within(&is))

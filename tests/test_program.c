@@ -29,6 +29,7 @@ static const ShaderSource sources[] = {
                    "void main() { colour = vec4(absent); }\n"},
     {"broken.glsl", "// one\n// two\nfloat f() { return nowhere; }\n"},
     {"broken.frag", "out vec4 c;\n#include \"broken.glsl\"\nvoid main() { c = vec4(f()); }\n"},
+    {"chosen.frag", "out vec4 c;\n#include PART\nvoid main() { c = vec4(half_of(1.0)); }\n"},
     {"lost.frag", "// one\n#include \"missing.glsl\"\nvoid main() {}\n"},
     {"defined.frag", "out vec4 colour;\nvoid main() { colour = vec4(SHADE, LINES); }\n"},
     {"mask.frag", "out vec4 c;\nvoid main() { gl_SampleMask[0] = 1; c = vec4(1.0); }\n"},
@@ -97,6 +98,13 @@ static void defines_reach_the_text(void** state)
     expect_fault(*state, "defined.frag", "defined.frag:2: ", "SHADE");
 }
 
+static void a_define_may_choose_what_is_included(void** state)
+{
+    expect_program(*state, "chosen.frag",
+                   "#define PARTS none\n#define PART half\n#define LINES 2.0\n");
+    expect_fault(*state, "chosen.frag", "chosen.frag:2: ", "\"PART\"");
+}
+
 static void errors_name_file_and_line(void** state)
 {
     expect_fault(*state, "bad.frag", "bad.frag:3: ", "absent");
@@ -158,6 +166,7 @@ int main(void)
         cmocka_unit_test(includes_nest_and_are_taken_once),
         cmocka_unit_test(every_file_is_glsl_330_with_sample_mask),
         cmocka_unit_test(defines_reach_the_text),
+        cmocka_unit_test(a_define_may_choose_what_is_included),
         cmocka_unit_test(errors_name_file_and_line),
         cmocka_unit_test(errors_in_an_included_file_name_that_file),
         cmocka_unit_test(missing_files_are_named),

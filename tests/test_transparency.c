@@ -257,7 +257,7 @@ static void open_stage(Stage* stage, const Gl* with, const ShadeOptions* options
 
 static void draw_stage(Stage* stage)
 {
-    stage->drawing.fresh = true;
+    stage->drawing.moved = true;
     assert_true(draw_picture(&stage->drawing, &stage->view, &stage->image));
 }
 
