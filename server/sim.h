@@ -3,7 +3,7 @@
 //
 // State is relative to the head's position and along world axes, so a head 100 km away costs no
 // precision, a carried (teleported) head touches no float, and the head's motion enters as the
-// second difference of its position. Layout: blocks of 16 strands, structure of arrays, lanes
+// second difference of its position. Layout: blocks of 32 strands, structure of arrays, lanes
 // across strands (strands.h), so that every loop over lanes is one vector instruction wide.
 // Bit-identical over thread counts, optimisation levels and compilers (-ffp-contract=off).
 #pragma once
@@ -112,6 +112,7 @@ typedef struct SimHead {
     // Where the torso is that the colliders of BODY_TORSO move with. Without one they move with the
     // head.
     bool has_torso;
+    bool torso_is_carried;   // it did not move here in this substep: hair in its way gets no speed
     float torso_rotation[9]; // row-major: world = rotation * torso
     Vec3 torso_offset;       // of its origin from the head's, world axes, m
 } SimHead;
