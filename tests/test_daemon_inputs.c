@@ -401,9 +401,36 @@ static void a_torso_for_nobody_is_refused(void** state)
     (void)state;
     DaemonOptions options = options_for(&heard, "none");
     Daemon* daemon = create(&options, &heard);
-    send_torso(daemon, 1, 0, 3);
+    for (int n = 0; n < 70; ++n) {
+        send_torso(daemon, 1 + n / 60.0, 0, 3);
+        tick(daemon, &heard);
+    }
+    assert_int_equal(heard.notices, 0); // it may still be added
+    for (int n = 70; n < 100; ++n) {
+        send_torso(daemon, 1 + n / 60.0, 0, 3);
+        tick(daemon, &heard);
+    }
+    assert_int_equal(heard.notices, 1);
+    assert_non_null(strstr(heard.notice, "without a character"));
+    assert_int_equal(daemon_status(daemon).rejected, 100);
+    daemon_destroy(daemon);
+}
+
+static void heads_and_torsos_of_all_slots_are_heard_in_one_tick(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "bus");
+    options.characters = 0;
+    Daemon* daemon = create(&options, &heard);
+    for (int slot = 0; slot < CHANNEL_MAX_SLOTS; ++slot) {
+        uint8_t bytes[CONTROL_MAX_BYTES];
+        PoseMessage message = {.pose = {.orientation = quat_identity()}, .slot = (uint16_t)slot};
+        size_t size = pose_encode(bytes, sizeof bytes, &message);
+        daemon_receive(daemon, CHANNEL_POSE, bytes, size);
+        daemon_receive(daemon, CHANNEL_TORSO, bytes, size);
+    }
     tick(daemon, &heard);
-    assert_int_equal(daemon_status(daemon).rejected, 1);
+    assert_int_equal(heard.applied, 2 * CHANNEL_MAX_SLOTS);
     daemon_destroy(daemon);
 }
 
@@ -439,6 +466,7 @@ int main(void)
         cmocka_unit_test(a_torso_that_is_put_under_hair_throws_none),
         cmocka_unit_test(a_motion_that_teleports_to_its_torso_throws_no_hair),
         cmocka_unit_test(a_torso_for_nobody_is_refused),
+        cmocka_unit_test(heads_and_torsos_of_all_slots_are_heard_in_one_tick),
         cmocka_unit_test(a_flood_of_poses_keeps_the_newest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
