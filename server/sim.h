@@ -142,8 +142,8 @@ void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* 
 // World-axes positions relative to the head, as simulated: [strand][node]; for measurements.
 void sim_state(const Sim* sim, Vec3* positions, Vec3* previous);
 
-// How many times a strand was put back to rest at the end of a tick, because a node of it was not
-// finite or 1 km away. The other strands are not touched.
+// How many times a strand was put back to rest at the end of a tick (or of a substep, where there
+// are ties), because a node of it was not finite or 1 km away. The other strands are not touched.
 int64_t sim_quarantined(const Sim* sim);
 
 // Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position,
