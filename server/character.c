@@ -151,9 +151,11 @@ static Vec3d wind_at(const WindMessage* wind, double t)
     return vec3d_scale(vec3d_from(wind->velocity), 1.0 + (double)wind->gust * swing);
 }
 
-static void move_torso(const Character* c, SimHead* head, double t)
+static void move_torso(Character* c, SimHead* head, double t)
 {
     head->has_torso = c->torso.any;
+    head->torso_is_carried = c->torso_is_carried;
+    c->torso_is_carried = false;
     if (!head->has_torso) return;
     Pose torso = poses_at(&c->torso, t);
     quat_matrix(head->torso_rotation, torso.orientation);
@@ -170,6 +172,7 @@ static void move_head(Character* c, SimHead* head, double t)
         c->move = move;
     } else {
         ++c->segment; // carried: the jump is no motion, and the speed before it goes on
+        c->torso_is_carried = c->torso.any;
     }
     c->motion_segment = state.segment;
     c->head = next;
@@ -180,9 +183,19 @@ static void move_head(Character* c, SimHead* head, double t)
     move_torso(c, head, t);
 }
 
+// Where either of them was put, or the hair waited meanwhile, the torso has not moved from where
+// the hair last met it: taken for motion, a metre in a substep throws hair at 90 m/s.
+static void enter_torso(Character* c)
+{
+    bool is_put = c->torso.pending || c->poses.pending || c->frozen;
+    c->torso_is_carried = c->torso.any && is_put;
+    c->torso.pending = false;
+}
+
 void character_step(Character* c, int64_t step, bool project)
 {
     double now = time_of(c, step, 0), dt = time_of(c, step, 1) - now;
+    enter_torso(c);
     enter_segment(c, now, dt);
     follow_freeze(c);
     for (int s = 0; s < sim_definition(c->sim)->substeps; ++s)

@@ -17,9 +17,10 @@ typedef struct Character {
     const Motion* motion;
     Pose base; // where the motion happens
     PoseRing poses;
-    PoseRing torso; // from the bus alone; while it is empty the torso moves with the head
-    Pose head;      // at the end of the last substep
-    Vec3d move;     // of the head in the last substep, m
+    PoseRing torso;        // from the bus alone; while it is empty the torso moves with the head
+    bool torso_is_carried; // relative to the head, from the last substep to the next one
+    Pose head;             // at the end of the last substep
+    Vec3d move;            // of the head in the last substep, m
     WindMessage wind;
     int motion_segment;
     int32_t segment; // as published

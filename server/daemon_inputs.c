@@ -121,6 +121,15 @@ static bool may_be_early(Daemon* daemon, int number)
     return (double)(1 + daemon->steps - *since) < ADD_PATIENCE_S * daemon->sim.rate_hz;
 }
 
+static void reject_orphan(Daemon* daemon, int number)
+{
+    if (may_be_early(daemon, number))
+        ++daemon->complaints.rejected;
+    else
+        complaints_reject(&daemon->complaints, COMPLAINT_EMPTY_SLOT,
+                          "a pose for a slot without a character");
+}
+
 static void apply_character(Daemon* daemon, const CharacterMessage* message)
 {
     if (message->verb == CHARACTER_REMOVE) {
@@ -159,11 +168,8 @@ static void push_pose(Daemon* daemon, Character* c, const PoseMessage* message)
 static void apply_pose(Daemon* daemon, const PoseMessage* message)
 {
     Character* c = daemon->characters[message->slot];
-    if (c == NULL && may_be_early(daemon, message->slot))
-        ++daemon->complaints.rejected;
-    else if (c == NULL)
-        complaints_reject(&daemon->complaints, COMPLAINT_EMPTY_SLOT,
-                          "a pose for a slot without a character");
+    if (c == NULL)
+        reject_orphan(daemon, message->slot);
     else if (c->motion->at != NULL)
         complaints_reject(&daemon->complaints, COMPLAINT_POSE_IN_CODE,
                           "a pose for a character that moves by itself; start with --motion bus");
@@ -175,11 +181,10 @@ static void apply_pose(Daemon* daemon, const PoseMessage* message)
 static void apply_torso(Daemon* daemon, const PoseMessage* message)
 {
     Character* c = daemon->characters[message->slot];
-    if (c != NULL)
-        poses_push(&c->torso, message, character_time(&daemon->sim, daemon->steps, 0));
+    if (c == NULL)
+        reject_orphan(daemon, message->slot);
     else
-        complaints_reject(&daemon->complaints, COMPLAINT_EMPTY_SLOT,
-                          "a pose for a slot without a character");
+        poses_push(&c->torso, message, character_time(&daemon->sim, daemon->steps, 0));
 }
 
 static bool is_among(const Character* c, int first, int count)

@@ -3,8 +3,8 @@
 
 #include "messages/control.h"
 
-#define INPUTS_MAX       256
-#define INPUTS_MAX_BYTES 256 // of a queued message; inputs are smaller
+#define INPUTS_MAX       4096 // two poses of head and torso for each slot, in a tick
+#define INPUTS_MAX_BYTES 256  // of a queued message; inputs are smaller
 
 typedef enum InputKind {
     INPUT_POSE,
@@ -32,6 +32,6 @@ typedef struct Inputs {
     int count;
 } Inputs;
 
-// False where the queue is full. A pose then takes the place of the newest waiting pose of its
-// slot: a head's latest place matters more than its way there.
+// False where the queue is full. A pose then takes the place of the newest waiting one of the same
+// head or torso: its latest place matters more than its way there.
 bool inputs_push(Inputs* inputs, const Input* input);

@@ -15,7 +15,8 @@ typedef struct Substep Substep;
 typedef struct Kernel {
     const char* name; // of the instruction set
     int width;        // floats that one instruction works on
-    // All substeps of a tick of `count` blocks, 1 to KERNEL_GANG; they stay in the cache meanwhile.
+    // Some substeps, as a rule all of a tick, of `count` blocks, 1 to KERNEL_GANG; they stay in the
+    // cache meanwhile.
     void (*step)(Block* blocks, int count, const Substep* substeps, int substep_count);
 } Kernel;
 

@@ -101,8 +101,9 @@ static bool is_within(const SimDefinition* d, const char* field, double value, d
 {
     return value <= bound ||
            fault_set(
-               fault, "simulation: %s is %g; %s at %g Hz and %d substeps is stable to %.0f: %s",
-               field, value, models[d->model].name, d->rate_hz, d->substeps, bound,
+               fault, "simulation: %s is %g; %s at %g Hz and %d substeps is stable to %.*f: %s",
+               field, value, models[d->model].name, d->rate_hz, d->substeps, bound < 100 ? 3 : 0,
+               bound,
                d->force ? "forced: strands will shake, and those that are lost go back to rest"
                         : "lower it, raise either, or --force it");
 }

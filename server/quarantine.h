@@ -37,9 +37,10 @@ static inline void rest_lane(Block* block, const float rotation[9], int l)
     }
 }
 
-// At the end of a tick, under the head's rotation then. The sum over a strand's nodes asks for all
-// of them at once. The positions of a substep ago need no look: what is wrong with them is wrong
-// with these by now.
+// At the end of a tick, and of strands that are tied to others of every substep, before an infinite
+// one can pull on its neighbours; under the head's rotation then. The sum over a strand's nodes
+// asks for all of them at once. The positions of a substep ago need no look: what is wrong with
+// them is wrong with these by now.
 static void quarantine_lost(Block* block, const float rotation[9])
 {
     real squares[LANES] = {0};

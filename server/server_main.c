@@ -110,8 +110,7 @@ static const struct argp_option option_table[] = {
      2},
     {"collide", KEY_COLLIDE, "point|pearl|segment", 0,
      "What is kept out of head and torso: nodes, nodes as small spheres (default), or those and "
-     "the "
-     "links between them",
+     "the links between them",
      2},
     {"stiffness", KEY_STIFFNESS, "S2", 0,
      "k/m at the root, 1/s^2 (1600, falling to the tip; cascade and forest 12000 all along)", 2},

@@ -3,7 +3,7 @@
 //
 // State is relative to the head's position and along world axes, so a head 100 km away costs no
 // precision, a carried (teleported) head touches no float, and the head's motion enters as the
-// second difference of its position. Layout: blocks of 16 strands, structure of arrays, lanes
+// second difference of its position. Layout: blocks of 32 strands, structure of arrays, lanes
 // across strands (strands.h), so that every loop over lanes is one vector instruction wide.
 // Bit-identical over thread counts, optimisation levels and compilers (-ffp-contract=off).
 #pragma once
@@ -112,6 +112,7 @@ typedef struct SimHead {
     // Where the torso is that the colliders of BODY_TORSO move with. Without one they move with the
     // head.
     bool has_torso;
+    bool torso_is_carried;   // it did not move here in this substep: hair in its way gets no speed
     float torso_rotation[9]; // row-major: world = rotation * torso
     Vec3 torso_offset;       // of its origin from the head's, world axes, m
 } SimHead;
@@ -141,8 +142,8 @@ void sim_positions(const Sim* sim, const float rotation[9], bool project, Vec3* 
 // World-axes positions relative to the head, as simulated: [strand][node]; for measurements.
 void sim_state(const Sim* sim, Vec3* positions, Vec3* previous);
 
-// How many times a strand was put back to rest at the end of a tick, because a node of it was not
-// finite or 1 km away. The other strands are not touched.
+// How many times a strand was put back to rest at the end of a tick (or of a substep, where there
+// are ties), because a node of it was not finite or 1 km away. The other strands are not touched.
 int64_t sim_quarantined(const Sim* sim);
 
 // Feeds slot-independent state bits into an XXH64 state: strand-major, node order, position,

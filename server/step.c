@@ -57,6 +57,7 @@ static void place_colliders(Sim* sim, Axis* axes, const SimHead* head)
         memcpy(now[BODY_TORSO].rotation, head->torso_rotation, sizeof head->torso_rotation);
         now[BODY_TORSO].offset = head->torso_offset;
     }
+    if (head->torso_is_carried) sim->bodies[BODY_TORSO] = now[BODY_TORSO];
     for (int k = 0; k < sim->definition.collider_count; ++k) {
         int body = sim->colliders[k].body;
         axes[k] = axis_of(&sim->colliders[k], &sim->bodies[body], &now[body]);

@@ -54,8 +54,7 @@ struct Case {
     double (*count)(const Work* work, const Case* one); // how many things a step does
 };
 
-// --- step
-// -----------------------------------------------------------------------------------------
+// --- step --------------------------------------------------------------------------------------
 
 // 46 degrees to each side: everything moves, nothing settles.
 static void sway(Work* work)
@@ -129,8 +128,7 @@ static double node_steps(const Work* work, const Case* one)
                                      : (double)one->strands * one->nodes);
 }
 
-// --- frame
-// ----------------------------------------------------------------------------------------
+// --- frame -------------------------------------------------------------------------------------
 
 static double nodes_of_style(const Work* work, const Case* one)
 {
@@ -219,8 +217,7 @@ static void decode_one(Work* work)
     }
 }
 
-// --- style
-// ----------------------------------------------------------------------------------------
+// --- style -------------------------------------------------------------------------------------
 
 static double one_thing(const Work* work, const Case* one)
 {
@@ -251,8 +248,7 @@ static void decode_style(Work* work)
     hairstyle_destroy(style);
 }
 
-// --- receive
-// --------------------------------------------------------------------------------------
+// --- receive -----------------------------------------------------------------------------------
 
 static void feed_style(Work* work)
 {
@@ -300,8 +296,7 @@ static double blocks_of_tick(const Work* work, const Case* one)
     return work->blocks;
 }
 
-// --- the table
-// ------------------------------------------------------------------------------------
+// --- the table ---------------------------------------------------------------------------------
 
 static const Case cases[] = {
     {"step", "long 64x8 with colliders", "ns per node-step", 1, 0, 0, set_up_long, step_tick,
@@ -336,8 +331,7 @@ static const Study studies[] = {
 };
 #define STUDIES (sizeof studies / sizeof studies[0])
 
-// --- measuring
-// ------------------------------------------------------------------------------------
+// --- measuring ---------------------------------------------------------------------------------
 
 static void tear_down(Work* work)
 {
@@ -409,8 +403,7 @@ static bool run(const Case* one, int repeats)
     return done;
 }
 
-// --- the command line
-// -----------------------------------------------------------------------------
+// --- the command line --------------------------------------------------------------------------
 
 enum { KEY_LIST = 256, KEY_REPEATS };
 

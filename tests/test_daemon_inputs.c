@@ -299,14 +299,19 @@ static void shrug(Heard* of, double height, bool has_torso)
 }
 
 // How far apart texels are at most, quanta.
-static int apart(const Heard* a, const Heard* b)
+static int apart_in(const Heard* a, const Heard* b, int slot)
 {
     int most = 0;
     for (int i = 0; i < 64 * 8 * 3; ++i) {
-        int d = abs(a->positions[1][i] - b->positions[1][i]);
+        int d = abs(a->positions[slot][i] - b->positions[slot][i]);
         most = d > most ? d : most;
     }
     return most;
+}
+
+static int apart(const Heard* a, const Heard* b)
+{
+    return apart_in(a, b, 1);
 }
 
 static void a_torso_posed_by_the_bus_pushes_hair(void** state)
@@ -321,14 +326,111 @@ static void a_torso_posed_by_the_bus_pushes_hair(void** state)
     assert_true(apart(&heard, &other) > 500); // a shrug lifts the hair that lies on the shoulders
 }
 
+// How a torso that stands 6 cm too high comes to be under the hair.
+typedef enum Coming { FIRST_POSE, NEW_SEGMENT, JUMP, HEAD_RESET, HEAD_CARRIED, THAW } Coming;
+
+static void send_torso_to(Daemon* daemon, double t, double x, int segment)
+{
+    uint8_t bytes[CONTROL_MAX_BYTES];
+    PoseMessage message = {.utime = (int64_t)(t * 1e6),
+                           .pose = {{x, 0.06, 0}, quat_identity()},
+                           .segment = segment,
+                           .verb = POSE_CARRY};
+    daemon_receive(daemon, CHANNEL_TORSO, bytes, pose_encode(bytes, sizeof bytes, &message));
+}
+
+// Head and torso are a metre apart until tick 60; of frozen hair the torso comes half a second
+// before that.
+static void send_both(Daemon* daemon, Coming how, int n)
+{
+    static const PoseVerb verbs[] = {[HEAD_RESET] = POSE_RESET, [HEAD_CARRIED] = POSE_CARRY};
+    bool is_over = n >= 60, is_head = how == HEAD_RESET || how == HEAD_CARRIED;
+    double t = 1 + n / 60.0, away = n >= (how == THAW ? 30 : 60) ? 0.0 : 1.0;
+    PoseVerb verb = is_head ? verbs[how] : how == THAW && !is_over ? POSE_FREEZE : POSE_FOLLOW;
+    send_pose_of(daemon, t, is_head ? away : 0.0, 0.0, is_head && is_over, verb);
+    if (how != FIRST_POSE || is_over)
+        send_torso_to(daemon, t, is_head ? 0.0 : away, how == NEW_SEGMENT && is_over);
+}
+
+// How far a node moves in a tick at most from then on, quanta on an axis.
+static int thrown(Coming how)
+{
+    DaemonOptions options = options_for(&heard, "bus");
+    Daemon* daemon = create(&options, &heard);
+    int most = 0;
+    for (int n = 0; n < 120; ++n) {
+        memcpy(&other, &heard, sizeof other);
+        send_both(daemon, how, n);
+        tick(daemon, &heard);
+        int moved = n < 60 ? 0 : apart_in(&heard, &other, 0);
+        most = moved > most ? moved : most;
+    }
+    daemon_destroy(daemon);
+    return most;
+}
+
+static void a_torso_that_is_put_under_hair_throws_none(void** state)
+{
+    (void)state;
+    for (Coming how = FIRST_POSE; how <= THAW; ++how) {
+        int moved = thrown(how);
+        assert_in_range(moved, 1000, 2000); // it is pushed aside all the same
+    }
+}
+
+// A head that teleports by itself, away from its torso and back.
+static void a_motion_that_teleports_to_its_torso_throws_no_hair(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "teleport");
+    Daemon* daemon = create(&options, &heard);
+    int most = 0;
+    for (int n = 0; n < 300; ++n) {
+        memcpy(&other, &heard, sizeof other);
+        send_torso_to(daemon, 1 + n / 60.0, 0.0, 0);
+        tick(daemon, &heard);
+        int moved = n < 60 ? 0 : apart_in(&heard, &other, 0);
+        most = moved > most ? moved : most;
+    }
+    assert_in_range(most, 1000, 2000);
+    daemon_destroy(daemon);
+}
+
 static void a_torso_for_nobody_is_refused(void** state)
 {
     (void)state;
     DaemonOptions options = options_for(&heard, "none");
     Daemon* daemon = create(&options, &heard);
-    send_torso(daemon, 1, 0, 3);
+    for (int n = 0; n < 70; ++n) {
+        send_torso(daemon, 1 + n / 60.0, 0, 3);
+        tick(daemon, &heard);
+    }
+    assert_int_equal(heard.notices, 0); // it may still be added
+    for (int n = 70; n < 100; ++n) {
+        send_torso(daemon, 1 + n / 60.0, 0, 3);
+        tick(daemon, &heard);
+    }
+    assert_int_equal(heard.notices, 1);
+    assert_non_null(strstr(heard.notice, "without a character"));
+    assert_int_equal(daemon_status(daemon).rejected, 100);
+    daemon_destroy(daemon);
+}
+
+static void heads_and_torsos_of_all_slots_are_heard_in_one_tick(void** state)
+{
+    (void)state;
+    DaemonOptions options = options_for(&heard, "bus");
+    options.characters = 0;
+    Daemon* daemon = create(&options, &heard);
+    for (int slot = 0; slot < CHANNEL_MAX_SLOTS; ++slot) {
+        uint8_t bytes[CONTROL_MAX_BYTES];
+        PoseMessage message = {.pose = {.orientation = quat_identity()}, .slot = (uint16_t)slot};
+        size_t size = pose_encode(bytes, sizeof bytes, &message);
+        daemon_receive(daemon, CHANNEL_POSE, bytes, size);
+        daemon_receive(daemon, CHANNEL_TORSO, bytes, size);
+    }
     tick(daemon, &heard);
-    assert_int_equal(daemon_status(daemon).rejected, 1);
+    assert_int_equal(heard.applied, 2 * CHANNEL_MAX_SLOTS);
     daemon_destroy(daemon);
 }
 
@@ -361,7 +463,10 @@ int main(void)
         cmocka_unit_test(an_unstable_tuning_is_refused_told_once_and_counted),
         cmocka_unit_test(inputs_wait_for_the_tick_and_are_said_as_applied),
         cmocka_unit_test(a_torso_posed_by_the_bus_pushes_hair),
+        cmocka_unit_test(a_torso_that_is_put_under_hair_throws_none),
+        cmocka_unit_test(a_motion_that_teleports_to_its_torso_throws_no_hair),
         cmocka_unit_test(a_torso_for_nobody_is_refused),
+        cmocka_unit_test(heads_and_torsos_of_all_slots_are_heard_in_one_tick),
         cmocka_unit_test(a_flood_of_poses_keeps_the_newest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
