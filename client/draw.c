@@ -5,6 +5,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 const char* const draw_pass_names[PASSES] = {"upload", "update", "shadow",
                                              "light",  "shade",  "read"};
@@ -100,18 +101,31 @@ static void find_bounds(const Drawing* drawing, const GuidesView* view, Frame* f
     frame->lit_high_m = high + margin_m;
 }
 
-static int64_t begin_pass(const Drawing* drawing)
+typedef struct PassClock {
+    int64_t us, processor_us;
+} PassClock;
+
+static PassClock read_clocks(void)
 {
-    return drawing->timed ? base_monotonic_us() : 0;
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (PassClock){base_monotonic_us(), (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000};
 }
 
-static void end_pass(Drawing* drawing, int pass, int64_t began_us)
+static PassClock begin_pass(const Drawing* drawing)
+{
+    return drawing->timed ? read_clocks() : (PassClock){0, 0};
+}
+
+static void end_pass(Drawing* drawing, int pass, PassClock began)
 {
     if (!drawing->timed) return;
     drawing->gl->Finish();
     DrawTimes* times = drawing->times;
-    times->ms[pass][times->count[pass]++ % DRAW_TIMES] =
-        (float)(base_monotonic_us() - began_us) * 1e-3f;
+    PassClock now = read_clocks();
+    int64_t at = times->count[pass]++ % DRAW_TIMES;
+    times->ms[pass][at] = (float)(now.us - began.us) * 1e-3f;
+    times->processor_ms[pass][at] = (float)(now.processor_us - began.processor_us) * 1e-3f;
 }
 
 // Puts hair in the order that its transparency wants, if any.
@@ -172,7 +186,7 @@ bool draw_picture(Drawing* drawing, const GuidesView* view, Image* image)
     Hair* hair = &drawing->hair;
     ++drawing->frames;
 
-    int64_t began = begin_pass(drawing);
+    PassClock began = begin_pass(drawing);
     int64_t bytes = hair->guides.bytes;
     if (upload_rows(&hair->guides, gl, view)) drawing->moved = true;
     drawing->uploaded_bytes += hair->guides.bytes - bytes;

@@ -11,7 +11,8 @@ extern const char* const draw_pass_names[PASSES];
 #define DRAW_TIMES 512 // of each pass are kept, for median and p95
 
 typedef struct DrawTimes {
-    float ms[PASSES][DRAW_TIMES]; // rings; CPU clock around glFinish
+    float ms[PASSES][DRAW_TIMES];           // rings; CPU clock around glFinish
+    float processor_ms[PASSES][DRAW_TIMES]; // of all threads of this process, a software GL's too
     int64_t count[PASSES];
 } DrawTimes;
 

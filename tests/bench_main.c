@@ -128,7 +128,7 @@ static double node_steps(const Work* work, const Case* one)
                                      : (double)one->strands * one->nodes);
 }
 
-// --- frame -------------------------------------------------------------------------------------
+// --- wire --------------------------------------------------------------------------------------
 
 static double nodes_of_style(const Work* work, const Case* one)
 {
@@ -304,12 +304,10 @@ static const Case cases[] = {
     {"step", "64x8", "ns per node-step", 1, 64, 8, set_up_free, step_tick, node_steps},
     {"step", "1024x8", "ns per node-step", 1, 1024, 8, set_up_free, step_tick, node_steps},
     {"step", "16384x8", "ns per node-step", 1, 16384, 8, set_up_free, step_tick, node_steps},
-    {"frame", "quantise long 64x8", "ns per node", 1, 0, 0, set_up_planes, quantise_all,
+    {"wire", "quantise long 64x8", "ns per node", 1, 0, 0, set_up_planes, quantise_all,
      nodes_of_style},
-    {"frame", "encode long 64x8", "ns per node", 1, 0, 0, set_up_blocks, encode_one,
-     nodes_of_style},
-    {"frame", "decode long 64x8", "ns per node", 1, 0, 0, set_up_blocks, decode_one,
-     nodes_of_style},
+    {"wire", "encode long 64x8", "ns per node", 1, 0, 0, set_up_blocks, encode_one, nodes_of_style},
+    {"wire", "decode long 64x8", "ns per node", 1, 0, 0, set_up_blocks, decode_one, nodes_of_style},
     {"style", "encode long", "ms", 1e6, 0, 0, set_up_style, encode_style, one_thing},
     {"style", "decode long", "ms", 1e6, 0, 0, set_up_style, decode_style, one_thing},
     {"receive", "long 64x8", "us per block", 1e3, 0, 0, set_up_receive, receive_tick,
@@ -323,6 +321,10 @@ static const Study studies[] = {
     {"accuracy", "errors against two truths over the clips, with the cost of each", study_accuracy},
     {"stability", "where the models fail: boundaries measured and derived, eleven maps",
      study_stability},
+    {"frame", "what a picture costs, by pass, triangles, distance, samples, transparency",
+     study_frame},
+    {"update", "what the update pass costs, by triangles", study_update},
+    {"transparency", "what each transparency gets wrong, with its cost", study_transparency},
     {"shadow", "error and time of shadow methods by layers, resolution, triangles", study_shadow},
     {"tree", "what the Adaptive Wisp Tree saves and what it gets wrong", study_tree},
     {"reference", "our pictures against path-traced ones of the same strands (../shared/assets)",
@@ -425,7 +427,7 @@ static const char documentation[] =
     "A node-step is one node through one of the four substeps of a tick.\n"
     "Examples:\n"
     "  hair-bench                     all of them\n"
-    "  hair-bench step frame          only these\n"
+    "  hair-bench step wire           only these\n"
     "  hair-bench --repeats 99 step > step.csv\n"
     "  hair-bench sim > sim.csv       a study, with columns of its own\n"
     "  hair-bench --list\n"
@@ -490,13 +492,13 @@ int main(int argc, char** argv)
     argp_parse(&argp, argc, argv, 0, NULL, &options);
     if (options.study != NULL && !options.list) return run_study(&options);
     for (size_t i = 0; options.list && i < STUDIES; ++i)
-        printf("%-9s %s (a study: columns of its own)\n", studies[i].name, studies[i].help);
+        printf("%-12s %s (a study: columns of its own)\n", studies[i].name, studies[i].help);
     if (!options.list) printf("bench,case,unit,min,median,repeats\n");
     bool done = true;
     for (size_t i = 0; i < CASES; ++i) {
         if (options.any && !options.wanted[i]) continue;
         if (options.list)
-            printf("%-9s %s, %s\n", cases[i].name, cases[i].what, cases[i].unit);
+            printf("%-12s %s, %s\n", cases[i].name, cases[i].what, cases[i].unit);
         else
             done = run(&cases[i], options.repeats) && done;
     }

@@ -1,5 +1,6 @@
-// Studies of hair-bench: many runs of the solver, as one CSV each, for scripts/chart. A study has
-// columns of its own and says in comment lines (#) what it holds and where it was made.
+// Studies of hair-bench: many runs of the solver or many pictures, as one CSV each, for
+// scripts/chart. A study has columns of its own and says in comment lines (#) what it holds and
+// where it was made.
 #pragma once
 
 #include "messages/base.h"
@@ -18,6 +19,9 @@ bool study_tree(Fault* fault);
 bool study_reference(Fault* fault);
 bool study_shading(Fault* fault);
 bool study_shadow(Fault* fault);
+bool study_frame(Fault* fault);
+bool study_update(Fault* fault);
+bool study_transparency(Fault* fault);
 
 // "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.
 void study_machine(void);

@@ -1,0 +1,10 @@
+# The update pass over triangles, beside the thesis's figure 6.1.3: scripts/chart --measure update update.
+set title "Update pass: llvmpipe on two cores (processor ms), a GeForce 7800 of 2005"
+set xlabel "triangles"
+set ylabel "ms"
+set logscale xy
+
+plot rows("update.csv", "$1 == \"update\" && $2 == \"update\"") using 3:14 with linespoints lw 2 pt 7 \
+         lc rgb SPRING title "ours", \
+     rows("thesis-6.1.csv", "$1 == \"6.1.3\"") using 3:6 with linespoints lw 1 dt 3 pt 6 \
+         lc rgb CASCADE title "GeForce"
