@@ -45,7 +45,8 @@ bool draw_set_style(Drawing* drawing, const Hairstyle* style, uint64_t hash, int
     if (drawing->has_style && hash == drawing->style_hash && version == drawing->style_version)
         return true;
     Hair hair;
-    if (!hair_create(&hair, drawing->gl, style, fault)) return false; // keep the old one
+    Lod lod = drawing->options.lod;
+    if (!hair_create(&hair, drawing->gl, style, lod, fault)) return false; // keep the old one
     if (!light_fit(&drawing->light, drawing->gl, &hair.update, fault)) {
         hair_free(&hair, drawing->gl);
         return false;

@@ -84,6 +84,7 @@
     X(void, Uniform3f, (GLint location, GLfloat v0, GLfloat v1, GLfloat v2)) \
     X(void, Uniform1uiv, (GLint location, GLsizei count, const GLuint* value)) \
     X(void, Uniform3fv, (GLint location, GLsizei count, const GLfloat* value)) \
+    X(void, Uniform4fv, (GLint location, GLsizei count, const GLfloat* value)) \
     X(void, UniformMatrix3fv, (GLint location, GLsizei count, GLboolean transpose, const GLfloat* value)) \
     X(void, UniformMatrix4fv, (GLint location, GLsizei count, GLboolean transpose, const GLfloat* value)) \
     X(void, GenQueries, (GLsizei n, GLuint* ids)) \

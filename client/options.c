@@ -27,6 +27,7 @@ enum {
     KEY_BACKGROUND,
     KEY_TRANSPARENCY,
     KEY_VIEW,
+    KEY_LOD,
     KEY_TICK,
     KEY_TICKS,
     KEY_EPOCH,
@@ -43,7 +44,7 @@ static const struct argp_option arguments[] = {
     {"log", KEY_LOG, "FILE", 0, "a recorded log, played frame by frame without a network", 0},
     {"embedded", KEY_EMBEDDED, 0, 0, "a daemon inside this process, one tick a frame", 0},
     {"style", KEY_STYLE, "NAME|FILE", 0,
-     "embedded: long, bob, ponytail, crest, a .json or .tfx files (repeat)", 0},
+     "embedded: long, bob, ponytail, curly, short, crest, a .json or .tfx files", 0},
     {"head", KEY_HEAD, "FILE.obj", 0, "embedded: the head of a .tfx groom", 0},
     {"unit", KEY_UNIT, "M", 0, "embedded: metres per unit of the groom's files", 0},
     {"motion", KEY_MOTION, "NAME", 0,
@@ -64,6 +65,8 @@ static const struct argp_option arguments[] = {
     {"transparency", KEY_TRANSPARENCY, "NAME", 0,
      "test, or hash (default at 2 or more samples): hash-dithered coverage", 0},
     {"view", KEY_VIEW, "NAME", 0, "shaded (default) or coverage: hair as linear grey", 0},
+    {"lod", KEY_LOD, "NAME", 0,
+     "full (default), or close, medium, far: 7,800, 2,000 or 1,250 triangles of hair", 0},
     {0, 0, 0, 0, "Which ticks", 3},
     {"tick", KEY_TICK, "N", 0, "draw exactly tick N (log, embedded)", 0},
     {"ticks", KEY_TICKS, "A:B[:STEP]", 0,
@@ -283,6 +286,9 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         break;
     case KEY_VIEW:
         shade->view = choice(state, "view", value, views) ? VIEW_COVERAGE : VIEW_SHADED;
+        break;
+    case KEY_LOD:
+        shade->lod = (Lod)choice(state, "lod", value, lod_names);
         break;
     default:
         return ARGP_ERR_UNKNOWN;

@@ -14,6 +14,7 @@ typedef struct ShadeOptions {
     int samples;               // 1, 2 or 4; lowered to what the driver has
     Transparency transparency; // auto: hash at 2 or more samples, test at 1
     ShadeView view;
+    Lod lod;
     bool has_background;
     Vec3 background;                      // linear; without it a soft grey backdrop
     float light_yaw_deg, light_pitch_deg; // of the key light; fill and rim keep their places to it

@@ -329,6 +329,7 @@ static const Study studies[] = {
     {"stability", "where the models fail: boundaries measured and derived, eleven maps",
      study_stability},
     {"tree", "what the Adaptive Wisp Tree saves and what it gets wrong", study_tree},
+    {"wisps", "how evenly wisps stand on the scalp, and what that costs", study_wisps},
 };
 #define STUDIES (sizeof studies / sizeof studies[0])
 

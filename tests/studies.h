@@ -15,6 +15,7 @@ bool study_sim(Fault* fault);
 bool study_accuracy(Fault* fault);
 bool study_stability(Fault* fault);
 bool study_tree(Fault* fault);
+bool study_wisps(Fault* fault);
 
 // "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.
 void study_machine(void);
