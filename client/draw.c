@@ -46,7 +46,8 @@ bool draw_set_style(Drawing* drawing, const Hairstyle* style, uint64_t hash, int
     if (drawing->has_style && hash == drawing->style_hash && version == drawing->style_version)
         return true;
     Hair hair;
-    if (!hair_create(&hair, drawing->gl, style, fault)) return false; // keep the old one
+    Lod lod = drawing->options.lod;
+    if (!hair_create(&hair, drawing->gl, style, lod, fault)) return false; // keep the old one
     if (!light_fit(&drawing->light, drawing->gl, &hair.update, fault)) {
         hair_free(&hair, drawing->gl);
         return false;
@@ -156,7 +157,7 @@ static void begin_frame(Drawing* drawing, const GuidesView* view)
 
 static void run_shadow(Drawing* drawing, const GuidesView* view)
 {
-    int64_t began = begin_pass(drawing);
+    PassClock began = begin_pass(drawing);
     find_bounds(drawing, view, &drawing->frame);
     drawing->draw_calls += shadow_run(&drawing->shadow, drawing->gl, &drawing->hair,
                                       drawing->shade.lights.key, &drawing->frame);
@@ -167,7 +168,7 @@ static void run_shade(Drawing* drawing, const GuidesView* view)
 {
     const Gl* gl = drawing->gl;
     const Frame* frame = &drawing->frame;
-    int64_t began = begin_pass(drawing);
+    PassClock began = begin_pass(drawing);
     light_run(&drawing->light, gl, &drawing->hair, &drawing->shadow, &drawing->shade.lights, frame,
               drawing->options.view == VIEW_TRANSMITTANCE);
     end_pass(drawing, PASS_LIGHT, began);

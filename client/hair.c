@@ -4,12 +4,12 @@
 
 #include <string.h>
 
-bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault)
+bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, Fault* fault)
 {
     memset(hair, 0, sizeof *hair);
     hair->style = style;
     hair->material = style->material;
-    if (!ribbons_build(&hair->ribbons, style, fault) ||
+    if (!ribbons_build_lod(&hair->ribbons, style, lod, fault) ||
         !upload_create(&hair->guides, gl, style, fault) ||
         !update_create(&hair->update, gl, style, &hair->ribbons, fault) ||
         !body_build(&hair->body, gl, style, &hair->ribbons, fault) ||

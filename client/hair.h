@@ -16,7 +16,7 @@ typedef struct Hair {
     GLuint vao, indices;
 } Hair;
 
-bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault);
+bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, Fault* fault);
 void hair_free(Hair* hair, const Gl* gl);
 
 // Texture units that ribbon.glsl and fibres.glsl read.

@@ -36,6 +36,7 @@ enum {
     KEY_SHADOWS,
     KEY_SHADOW_SIZE,
     KEY_SHADOW_LAYERS,
+    KEY_LOD,
     KEY_TICK,
     KEY_TICKS,
     KEY_EPOCH,
@@ -52,7 +53,7 @@ static const struct argp_option arguments[] = {
     {"log", KEY_LOG, "FILE", 0, "a recorded log, played frame by frame without a network", 0},
     {"embedded", KEY_EMBEDDED, 0, 0, "a daemon inside this process, one tick a frame", 0},
     {"style", KEY_STYLE, "NAME|FILE", 0,
-     "embedded: long, bob, ponytail, crest, a .json or .tfx files (repeat)", 0},
+     "embedded: long, bob, ponytail, curly, short, crest, a .json or .tfx files", 0},
     {"head", KEY_HEAD, "FILE.obj", 0, "embedded: the head of a .tfx groom", 0},
     {"unit", KEY_UNIT, "M", 0, "embedded: metres per unit of the groom's files", 0},
     {"motion", KEY_MOTION, "NAME", 0,
@@ -95,6 +96,8 @@ static const struct argp_option arguments[] = {
      0},
     {"shadow-layers", KEY_SHADOW_LAYERS, "N", 0,
      "planes of optical depth: 4 to 128 (opacity, default 16), 2 to 8 (deep, default 4)", 0},
+    {"lod", KEY_LOD, "NAME", 0,
+     "full (default), or close, medium, far: 7,800, 2,000 or 1,250 triangles of hair", 0},
     {0, 0, 0, 0, "Which ticks", 3},
     {"tick", KEY_TICK, "N", 0, "draw exactly tick N (log, embedded)", 0},
     {"ticks", KEY_TICKS, "A:B[:STEP]", 0,
@@ -377,6 +380,9 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         break;
     case KEY_VIEW:
         shade->view = (ShadeView)choice(state, "view", value, views);
+        break;
+    case KEY_LOD:
+        shade->lod = (Lod)choice(state, "lod", value, lod_names);
         break;
     default:
         return parse_shadow(key, value, state, &shade->shadow);

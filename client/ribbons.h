@@ -8,8 +8,8 @@
 // strands as well.
 #pragma once
 
+#include "client/lod.h"
 #include "messages/drawn.h"
-#include "messages/hairstyle.h"
 
 #define RIBBONS_RESTART 0xFFFFFFFFu
 
@@ -21,12 +21,16 @@ typedef struct Ribbons {
     Texel* weights;    // of a, b, c; half width in m
     Texel* offsets;    // rest offset x, y, z; share of fibres that fill the ribbon (0..1)
     Texel* tangents;   // of the drawn curve at rest x, y, z; 0 at the root .. 1 at the tip
-    Texel* normals;    // away from the head at rest x, y, z; a random number of the ribbon 0..1
+    Texel* normals;    // away from the head at rest x, y, z; random number of the ribbon 0..1, in
+                       // quarters its strand texture
     uint32_t* indices; // triangle strips, RIBBONS_RESTART between: vertex = 2 * point + edge
+    int collider_count;
+    Collider colliders[HAIRSTYLE_MAX_COLLIDERS]; // the head's, which moved points are kept out of
 } Ribbons;
 
 // Grows and binds everything `style` draws. The same style gives the same bits on every client.
 bool ribbons_build(Ribbons* ribbons, const Hairstyle* style, Fault* fault);
+bool ribbons_build_lod(Ribbons* ribbons, const Hairstyle* style, Lod lod, Fault* fault);
 void ribbons_free(Ribbons* ribbons);
 
 // Point `i` as the double-precision reference takes it.

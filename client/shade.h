@@ -21,6 +21,7 @@ typedef struct ShadeOptions {
     bool has_colour; // of hair, instead of the style's
     int colour;      // shading_colour
     ShadowOptions shadow;
+    Lod lod;
     bool has_background;
     Vec3 background;                      // linear; without it a soft grey backdrop
     float light_yaw_deg, light_pitch_deg; // of the key light; fill and rim keep their places to it

@@ -40,7 +40,22 @@ static bool upload_rest(Update* update, const Gl* gl, const Hairstyle* style, Fa
     return true;
 }
 
-static bool build_program(Update* update, const Gl* gl, const Hairstyle* style, Fault* fault)
+static void put_colliders(const Gl* gl, GLuint program, const Ribbons* ribbons)
+{
+    float from[HAIRSTYLE_MAX_COLLIDERS][4], to[HAIRSTYLE_MAX_COLLIDERS][4];
+    for (int i = 0; i < ribbons->collider_count; ++i) {
+        const Collider* c = &ribbons->colliders[i];
+        memcpy(from[i], (const float[4]){c->from.x, c->from.y, c->from.z, c->radius}, 16);
+        memcpy(to[i], (const float[4]){c->to.x, c->to.y, c->to.z, 0}, 16);
+    }
+    gl->Uniform1i(program_uniform(gl, program, "capsules"), ribbons->collider_count);
+    if (ribbons->collider_count == 0) return;
+    gl->Uniform4fv(program_uniform(gl, program, "capsule_from"), ribbons->collider_count, from[0]);
+    gl->Uniform4fv(program_uniform(gl, program, "capsule_to"), ribbons->collider_count, to[0]);
+}
+
+static bool build_program(Update* update, const Gl* gl, const Hairstyle* style,
+                          const Ribbons* ribbons, Fault* fault)
 {
     update->program = program_build(gl, "fullscreen.vert", "update.frag", NULL, fault);
     if (update->program == 0) return false;
@@ -52,6 +67,7 @@ static bool build_program(Update* update, const Gl* gl, const Hairstyle* style, 
     gl->UseProgram(update->program);
     program_uniform3(gl, update->program, "box_low", style->box.low);
     program_uniform3(gl, update->program, "box_size", vec3_sub(style->box.high, style->box.low));
+    put_colliders(gl, update->program, ribbons);
     update->blend = program_uniform(gl, update->program, "blend");
     update->newest = program_uniform(gl, update->program, "newest");
     return true;
@@ -88,7 +104,7 @@ bool update_create(Update* update, const Gl* gl, const Hairstyle* style, const R
     for (int i = 0; i < UPDATE_TABLES; ++i)
         update->tables[i] = table(gl, texels[i], ribbons->point_count, update->rows);
     gl->GenVertexArrays(1, &update->vao);
-    if (upload_rest(update, gl, style, fault) && build_program(update, gl, style, fault) &&
+    if (upload_rest(update, gl, style, fault) && build_program(update, gl, style, ribbons, fault) &&
         build_targets(update, gl, fault))
         return true;
     update_free(update, gl);

@@ -95,6 +95,35 @@ Vec3d drawn_position(const DrawnPoint* point, int nodes, const Vec3* positions,
     return vec3d_add(at, offset);
 }
 
+// From the nearest point of the axis.
+static Vec3d from_axis(Vec3d at, const Collider* collider)
+{
+    Vec3d from = vec3d_sub(at, vec3d_from(collider->from));
+    Vec3d axis = vec3d_sub(vec3d_from(collider->to), vec3d_from(collider->from));
+    double square = vec3d_dot(axis, axis);
+    double u = square > 0.0 ? vec3d_dot(from, axis) / square : 0.0;
+    u = u < 0.0 ? 0.0 : u > 1.0 ? 1.0 : u;
+    return vec3d_sub(from, vec3d_scale(axis, u));
+}
+
+double drawn_axis_distance(Vec3d at, const Collider* collider)
+{
+    Vec3d from = from_axis(at, collider);
+    return sqrt(vec3d_dot(from, from));
+}
+
+Vec3d drawn_push_out(Vec3d at, const Collider* colliders, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        Vec3d from = from_axis(at, &colliders[i]);
+        double distance = sqrt(vec3d_dot(from, from));
+        double lack = (double)colliders[i].radius - distance;
+        if (lack <= 0.0 || distance < DRAWN_ON_AXIS_M) continue;
+        at = vec3d_add(at, vec3d_scale(from, (lack < distance ? lack : distance) / distance));
+    }
+    return at;
+}
+
 void drawn_from_bound(DrawnPoint* out, const Hairstyle* style, const StrandSet* set, int strand,
                       int point)
 {

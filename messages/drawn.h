@@ -21,6 +21,7 @@
 #include "messages/hairstyle.h"
 
 #define DRAWN_OPPOSED        (-0.9999)
+#define DRAWN_ON_AXIS_M      1e-6
 #define DRAWN_MIN_TANGENT_SQ 1e-12 // of the blended tangent before it is normalised
 
 typedef struct DrawnPoint {
@@ -34,6 +35,15 @@ typedef struct DrawnPoint {
 // NULL) receives T, or (0, -1, 0) where there is none.
 Vec3d drawn_position(const DrawnPoint* point, int nodes, const Vec3* positions,
                      const Vec3* tangents, const Vec3* rest_tangents, Vec3d* tangent);
+
+// From the axis of a capsule.
+double drawn_axis_distance(Vec3d at, const Collider* collider);
+
+// What the update pass does to every point last: out of the capsules, one after the other, since
+// wisps between guides may be carried into a head that the guides go round. By what lacks to the
+// radius, but no further than the point is from the axis, so that all is continuous: what is half
+// as deep as it could be comes out, what is on the axis stays.
+Vec3d drawn_push_out(Vec3d at, const Collider* colliders, int count);
 
 // Point `point` of the set's strand `strand` (both counted from 0 within the set; explicit sets
 // only) as its integers decode.

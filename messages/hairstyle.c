@@ -33,6 +33,7 @@ void hairstyle_destroy(Hairstyle* style)
     if (style == NULL) return;
     free(style->rest);
     free(style->weight);
+    free(style->maps);
     free(style->triangles);
     free(style->strands);
     free(style->offsets);
@@ -67,10 +68,24 @@ bool hairstyle_set_guides(Hairstyle* style, int guide_count, int nodes, Fault* f
         weight[guide * nodes] = 0;
     free(style->rest);
     free(style->weight);
+    free(style->maps); // they were of other guides
+    style->maps = NULL;
     style->rest = rest;
     style->weight = weight;
     style->guide_count = guide_count;
     style->nodes = nodes;
+    return true;
+}
+
+bool hairstyle_add_maps(Hairstyle* style, Fault* fault)
+{
+    size_t count = (size_t)style->guide_count * MAP_COUNT;
+    uint8_t* maps = malloc(count + 1);
+    if (maps == NULL) return fault_set(fault, "no memory for the maps of the scalp");
+    for (size_t i = 0; i < count; ++i)
+        maps[i] = i % MAP_COUNT == MAP_TEXTURE ? 0 : MAP_ONE;
+    free(style->maps);
+    style->maps = maps;
     return true;
 }
 
@@ -249,6 +264,33 @@ static bool check_set_numbers(const StrandSet* set, int i, Fault* fault)
     return true;
 }
 
+static bool check_form(const WispForm* form, int i, Fault* fault)
+{
+    if (!in_range(form->belly, 0.0f, 10.0f) || !in_range(form->taper, 0.0f, 1.0f) ||
+        !in_range(form->clump, 0.0f, 1.0f))
+        return fault_set(fault, "set %d: belly 0 to 10, taper and clump 0 to 1", i);
+    if (!in_range(form->curl_radius_m, 0.0f, 1.0f) ||
+        !in_range(form->curl_turns, -100.0f, 100.0f) || !in_range(form->curl_stiffness, 0.0f, 1.0f))
+        return fault_set(
+            fault, "set %d: curls have 0 to 1 m of radius, up to 100 turns, stiffness 0 to 1", i);
+    return in_range(form->rotation_rad, 0.0f, 6.3f) ||
+           fault_set(fault, "set %d: rotation is radians from 0 to 6.3", i);
+}
+
+static bool check_magnets(const Hairstyle* style, Fault* fault)
+{
+    if (style->magnet_count < 0 || style->magnet_count > HAIRSTYLE_MAX_MAGNETS)
+        return fault_set(fault, "%d magnets: at most %d", style->magnet_count,
+                         HAIRSTYLE_MAX_MAGNETS);
+    for (int i = 0; i < style->magnet_count; ++i) {
+        const Magnet* m = &style->magnets[i];
+        if (!near_head(m->at) || !in_range(m->reach_m, 0.0f, FARTHEST_M) ||
+            !in_range(m->pull, -1.0f, 1.0f))
+            return fault_set(fault, "magnet %d: place and reach must be finite, pull -1 to 1", i);
+    }
+    return true;
+}
+
 static bool check_grown(const Hairstyle* style, const StrandSet* set, int i, Fault* fault)
 {
     if (set->triangle_count < 1 ||
@@ -314,7 +356,8 @@ static bool check_sets(const Hairstyle* style, Fault* fault)
     int guides = 0, strands = 0, offsets = 0;
     for (int i = 0; i < style->set_count; ++i) {
         const StrandSet* set = &style->sets[i];
-        if (!check_set_numbers(set, i, fault)) return false;
+        if (!check_set_numbers(set, i, fault) || !check_form(&style->forms[i], i, fault))
+            return false;
         if (!claim_guides(style, set, i, taken, fault)) return false;
         guides += set->guide_count;
         if (set->kind == STRANDS_GROWN) {
@@ -401,6 +444,6 @@ bool hairstyle_validate(const Hairstyle* style, Fault* fault)
 {
     return check_look(style, fault) && check_guides(style, fault) &&
            check_triangles(style, fault) && check_holds(style, fault) &&
-           check_strand_tables(style, fault) && check_sets(style, fault) &&
-           check_head(&style->head, fault);
+           check_magnets(style, fault) && check_strand_tables(style, fault) &&
+           check_sets(style, fault) && check_head(&style->head, fault);
 }

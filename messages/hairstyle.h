@@ -20,6 +20,7 @@
 #define HAIRSTYLE_MAX_TRIANGLES 2048
 #define HAIRSTYLE_MAX_COLLIDERS 32
 #define HAIRSTYLE_MAX_HOLDS     16
+#define HAIRSTYLE_MAX_MAGNETS   8
 #define HAIRSTYLE_MAX_STRANDS   65536
 #define HAIRSTYLE_MAX_POINTS    64 // along one drawn strand
 #define HAIRSTYLE_MAX_VERTICES  65535
@@ -42,6 +43,39 @@ typedef struct StrandSet {
     float fibres;                       // how many hairs a ribbon stands for, side by side
     float jitter_m;                     // grown: how far a wisp strays from its guides at the tip
 } StrandSet;
+
+// How the wisps of a grown set are shaped along themselves; all zero: of even width, uncurled.
+typedef struct WispForm {
+    float belly;          // how much wider their middle is, a share of the width there
+    float taper;          // the share of their width that tips lose
+    float curl_radius_m;  // of the cylinder that they wind round (Koster 2004), at the tip
+    float curl_turns;     // how often, root to tip
+    float curl_stiffness; // 0..1: how far from the root curls open; 0 at once
+    float rotation_rad;   // how far their frames are turned from the patch direction, either way
+    float clump;          // 0..1: how closely the tips of a lock meet
+} WispForm;
+
+// What the scalp says of the wisps rooted there: a number at each guide, read between them by the
+// weights of the root. A factor, 128 is 1; MAP_TEXTURE is a layer of the strand textures instead,
+// one above, and 0 leaves the choice to chance.
+typedef enum ScalpMap {
+    MAP_DENSITY,
+    MAP_WIDTH,
+    MAP_LENGTH,
+    MAP_ROTATION,
+    MAP_SEGMENTS,
+    MAP_TEXTURE,
+    MAP_COUNT
+} ScalpMap;
+
+#define MAP_ONE 128 // of a factor
+
+// A point that wisps grow towards (pull > 0) or shy away from, the more the nearer their tips.
+typedef struct Magnet {
+    Vec3 at;
+    float reach_m; // nothing beyond it
+    float pull;    // -1..1
+} Magnet;
 
 // Three guides whose roots are the corners of a patch of scalp.
 typedef struct ScalpTriangle {
@@ -105,12 +139,16 @@ typedef struct Hairstyle {
     uint8_t* weight; // [guide_count][nodes]: 255 physics ... 0 skinned to the head
     int set_count;
     StrandSet sets[HAIRSTYLE_MAX_SETS];
+    WispForm forms[HAIRSTYLE_MAX_SETS]; // of the sets
     int triangle_count;
     ScalpTriangle* triangles;
     int collider_count;
     Collider colliders[HAIRSTYLE_MAX_COLLIDERS];
     int hold_count;
     Hold holds[HAIRSTYLE_MAX_HOLDS];
+    int magnet_count;
+    Magnet magnets[HAIRSTYLE_MAX_MAGNETS];
+    uint8_t* maps; // [guide_count][MAP_COUNT]; NULL: all factors 1, textures by chance
     HairMaterial material;
     int head_kind;    // HeadKind
     Vec3 head_centre; // half-way between chin and crown: what cameras orbit
@@ -130,6 +168,9 @@ void hairstyle_destroy(Hairstyle* style);
 // Allocates `rest` and `weight` (all 255 but node 0, which is 0) for the counts given; false with a
 // fault when a count is outside its cap or memory ends. Frees what was there.
 bool hairstyle_set_guides(Hairstyle* style, int guide_count, int nodes, Fault* fault);
+
+// Allocates `maps`, neutral, for the guides there are; false with a fault without memory.
+bool hairstyle_add_maps(Hairstyle* style, Fault* fault);
 
 // Sets `box` to the union over guides of the ball (root, HAIRSTYLE_SCALE_LENGTH x length): guides
 // that keep their length cannot leave it (design 4).

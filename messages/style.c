@@ -76,7 +76,8 @@ static void carry_lead(Cursor* cursor, FastLead* lead)
     carry_bytes(cursor, &lead->bulk_hash, 8);
 }
 
-static void carry_fixed(Cursor* cursor, Hairstyle* style)
+// `map_count`: MAP_COUNT, or 0 of a style without maps.
+static void carry_fixed(Cursor* cursor, Hairstyle* style, int* map_count)
 {
     carry_name(cursor, style->name);
     carry_bytes(cursor, &style->seed, 4);
@@ -86,6 +87,10 @@ static void carry_fixed(Cursor* cursor, Hairstyle* style)
     carry_int(cursor, &style->triangle_count);
     carry_int(cursor, &style->collider_count);
     if (cursor->format >= 2) carry_int(cursor, &style->hold_count);
+    if (cursor->format >= 3) {
+        carry_int(cursor, &style->magnet_count);
+        carry_int(cursor, map_count);
+    }
     carry_int(cursor, &style->head_kind);
     carry_bytes(cursor, &style->offset_scale_m, 4);
     carry_vec3(cursor, &style->material.root_colour);
@@ -114,6 +119,24 @@ static void carry_set(Cursor* cursor, StrandSet* set)
     carry_bytes(cursor, &set->jitter_m, 4);
 }
 
+static void carry_form(Cursor* cursor, WispForm* form)
+{
+    carry_bytes(cursor, &form->belly, 4);
+    carry_bytes(cursor, &form->taper, 4);
+    carry_bytes(cursor, &form->curl_radius_m, 4);
+    carry_bytes(cursor, &form->curl_turns, 4);
+    carry_bytes(cursor, &form->curl_stiffness, 4);
+    carry_bytes(cursor, &form->rotation_rad, 4);
+    carry_bytes(cursor, &form->clump, 4);
+}
+
+static void carry_magnet(Cursor* cursor, Magnet* magnet)
+{
+    carry_vec3(cursor, &magnet->at);
+    carry_bytes(cursor, &magnet->reach_m, 4);
+    carry_bytes(cursor, &magnet->pull, 4);
+}
+
 // A collider of format 1 was a sphere of the head: a capsule whose ends are one point.
 static void carry_collider(Cursor* cursor, Collider* collider)
 {
@@ -131,6 +154,8 @@ static void carry_tables(Cursor* cursor, Hairstyle* style)
 {
     for (int i = 0; i < style->set_count; ++i)
         carry_set(cursor, &style->sets[i]);
+    for (int i = 0; i < style->set_count && cursor->format >= 3; ++i)
+        carry_form(cursor, &style->forms[i]);
     for (int i = 0; i < style->collider_count; ++i)
         carry_collider(cursor, &style->colliders[i]);
     for (int i = 0; i < style->hold_count; ++i) {
@@ -139,14 +164,18 @@ static void carry_tables(Cursor* cursor, Hairstyle* style)
         carry_int(cursor, &style->holds[i].guide_count);
         carry_int(cursor, &style->holds[i].node);
     }
+    for (int i = 0; i < style->magnet_count; ++i)
+        carry_magnet(cursor, &style->magnets[i]);
     for (int i = 0; i < style->triangle_count; ++i)
         carry_bytes(cursor, style->triangles[i].guide, 6);
     for (int i = 0; i < style->guide_count * style->nodes; ++i)
         carry_vec3(cursor, &style->rest[i]);
     carry_bytes(cursor, style->weight, (size_t)(style->guide_count * style->nodes));
+    if (style->maps != NULL)
+        carry_bytes(cursor, style->maps, (size_t)style->guide_count * MAP_COUNT);
 }
 
-static bool allocate_tables(Hairstyle* style, Fault* fault)
+static bool allocate_tables(Hairstyle* style, int map_count, Fault* fault)
 {
     if (style->set_count < 0 || style->set_count > HAIRSTYLE_MAX_SETS ||
         style->collider_count < 0 || style->collider_count > HAIRSTYLE_MAX_COLLIDERS ||
@@ -155,7 +184,13 @@ static bool allocate_tables(Hairstyle* style, Fault* fault)
         return fault_set(
             fault, "style: %d sets, %d colliders, %d holds, %d triangles: beyond the caps",
             style->set_count, style->collider_count, style->hold_count, style->triangle_count);
-    if (!hairstyle_set_guides(style, style->guide_count, style->nodes, fault)) return false;
+    if (style->magnet_count < 0 || style->magnet_count > HAIRSTYLE_MAX_MAGNETS ||
+        (map_count != 0 && map_count != MAP_COUNT))
+        return fault_set(fault, "style: %d magnets, at most %d; %d maps, 0 or %d",
+                         style->magnet_count, HAIRSTYLE_MAX_MAGNETS, map_count, MAP_COUNT);
+    if (!hairstyle_set_guides(style, style->guide_count, style->nodes, fault) ||
+        (map_count > 0 && !hairstyle_add_maps(style, fault)))
+        return false;
     style->triangles = calloc((size_t)style->triangle_count + 1, sizeof *style->triangles);
     return style->triangles != NULL || fault_set(fault, "style: no memory for its triangles");
 }
@@ -174,10 +209,11 @@ static bool check_lead(const FastLead* lead, Fault* fault)
 
 static bool read_fast(Hairstyle* style, Cursor* cursor, Fault* fault)
 {
-    carry_fixed(cursor, style);
+    int map_count = 0;
+    carry_fixed(cursor, style, &map_count);
     if (cursor->passed_end) return fault_set(fault, "style: cut off inside its fixed part");
     // The counts are read before the arrays exist; set_guides must see no pointers to free.
-    if (!allocate_tables(style, fault)) return false;
+    if (!allocate_tables(style, map_count, fault)) return false;
     carry_tables(cursor, style);
     if (cursor->passed_end || cursor->at != cursor->size)
         return fault_set(fault, "style: %zu bytes, which disagrees with its counts", cursor->size);
@@ -220,8 +256,9 @@ static bool encode_fast(StyleBytes* bytes, const Hairstyle* style, Fault* fault)
     // carry_* writes through its pointer only when reading or to pad a name with zeros, and both
     // leave a copy's arrays as they are.
     Hairstyle copy = *style;
+    int map_count = style->maps != NULL ? MAP_COUNT : 0;
     carry_lead(&cursor, &lead);
-    carry_fixed(&cursor, &copy);
+    carry_fixed(&cursor, &copy, &map_count);
     carry_tables(&cursor, &copy);
     if (cursor.passed_end) {
         free(lane);

@@ -12,8 +12,8 @@
 #define STYLE_BULK_MAX_BYTES (4 * 1024 * 1024)
 #define STYLE_MAX_PARTS      4096
 #define STYLE_HEADER_BYTES   56 // of a style_t message: see messages/README.md
-#define STYLE_FORMAT         2  // written; those from STYLE_FORMAT_OLDEST on are read
-#define STYLE_FORMAT_OLDEST  1  // spheres of the head only, no holds
+#define STYLE_FORMAT         3  // written; those from STYLE_FORMAT_OLDEST on are read
+#define STYLE_FORMAT_OLDEST  1  // spheres of the head only, no holds; 2: no forms, magnets, maps
 
 typedef enum StyleLane { STYLE_FAST = 0, STYLE_BULK = 1, STYLE_LANES = 2 } StyleLane;
 

@@ -2,6 +2,7 @@
 
 #include "messages/mannequin.h"
 #include "messages/trig.h"
+#include "server/looks.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -9,27 +10,7 @@
 // How a built-in style comes about, in this order: roots (a row along each side of the parting, a
 // row along the hairline, the rest relaxed between them), scalp triangles (Delaunay on the sphere,
 // none across the parting), guides (marched over the skull, then hanging), resampled and cleared.
-//
-// A new style is a new Look.
-typedef struct Look {
-    const char* name;
-    uint32_t seed;
-    float parting_x_m, parting_end_m; // where hair divides, how far back; behind that it falls
-    float lift_m;                     // volume: how far hair stands off the skull (8 mm is sleek)
-    float sweep;                      // front hair goes back (1) rather than to the side (0)
-    float fringe;                     // how steeply front hair crosses the forehead
-    float face_m;                     // how far forward hair may hang beside the face
-    float gather, gather_z_m;         // how strongly hanging hair is drawn to that depth
-    float hem_m;                      // height of the tips at the back
-    float hem_front_m, hem_side_m;    // added to it at the front and the sides
-    float hug;                        // how closely hanging hair closes in on the neck
-    float curl, curl_m;               // ends turn inward (positive) over the last curl_m
-    float least_m, most_m;            // shortest and longest guide
-    bool is_tied;                     // all of it through a band, without a parting
-    Vec3 band;                        // where that is
-    float band_m;                     // its radius
-    Vec3 root_colour, tip_colour;
-} Look;
+// What the styles are: server/looks.c.
 
 #define GUIDES          64
 #define NODES           8
@@ -511,7 +492,7 @@ static void tie_guides(const Plan* plan, Hairstyle* style)
     style->holds[style->hold_count++] = (Hold){HOLD_BAND, 0, style->guide_count, BAND_NODE};
 }
 
-static void fill_set(Hairstyle* style)
+static void fill_set(Hairstyle* style, const Look* look)
 {
     style->set_count = 1;
     style->sets[0] = (StrandSet){
@@ -519,13 +500,35 @@ static void fill_set(Hairstyle* style)
         .kind = STRANDS_GROWN,
         .guide_count = style->guide_count,
         .triangle_count = style->triangle_count,
-        .strand_count = 2600,
-        .points = 17,
-        .root_width_m = 0.0026f,
-        .tip_width_m = 0.0034f,
-        .fibres = 9.0f,
-        .jitter_m = 0.009f,
+        .strand_count = look->wisps,
+        .points = look->points,
+        .root_width_m = look->root_width_m,
+        .tip_width_m = look->tip_width_m,
+        .fibres = look->fibres,
+        .jitter_m = look->jitter_m,
     };
+    style->forms[0] = look->form;
+    style->magnet_count = look->magnet.pull != 0.0f;
+    style->magnets[0] = look->magnet;
+}
+
+static uint8_t map_value(float factor)
+{
+    return (uint8_t)(factor * MAP_ONE + 0.5f);
+}
+
+// Shorter, and cut closer, towards the nape and over the ears.
+static bool fill_maps(Hairstyle* style, const Look* look, Fault* fault)
+{
+    if (look->nape_length == 0.0f) return true;
+    if (!hairstyle_add_maps(style, fault)) return false;
+    for (int g = 0; g < style->guide_count; ++g) {
+        Vec3 root = style->rest[g * style->nodes];
+        float high = smooth((root.y - 0.175f) / 0.10f);
+        float length = look->nape_length + (1.0f - look->nape_length) * high;
+        style->maps[g * MAP_COUNT + MAP_LENGTH] = map_value(length);
+    }
+    return true;
 }
 
 static bool fill_style(const Plan* plan, Hairstyle* style, Fault* fault)
@@ -542,7 +545,8 @@ static bool fill_style(const Plan* plan, Hairstyle* style, Fault* fault)
         tie_guides(plan, style);
     else
         grow_guides(plan, style);
-    fill_set(style);
+    fill_set(style, plan->look);
+    if (!fill_maps(style, plan->look, fault)) return false;
     style->collider_count = mannequin_colliders(style->colliders, HAIRSTYLE_MAX_COLLIDERS);
     style->material.root_colour = plan->look->root_colour;
     style->material.tip_colour = plan->look->tip_colour;
@@ -574,69 +578,25 @@ static Hairstyle* make(const Look* look, Fault* fault)
 
 Hairstyle* groom_long(Fault* fault)
 {
-    static const Look look = {
-        .name = "long",
-        .seed = 1,
-        .parting_x_m = 0.014f,
-        .parting_end_m = -0.035f,
-        .lift_m = 0.013f,
-        .sweep = 0.45f,
-        .face_m = 0.042f,
-        .gather = 0.75f,
-        .gather_z_m = -0.095f,
-        .hem_m = -0.060f,
-        .hem_side_m = 0.020f,
-        .hug = 0.14f,
-        .curl_m = 0.05f,
-        .least_m = 0.15f,
-        .most_m = 0.43f,
-        .root_colour = {0.060f, 0.026f, 0.013f},
-        .tip_colour = {0.115f, 0.052f, 0.025f},
-    };
-    return make(&look, fault);
+    return make(&looks[LOOK_LONG], fault);
 }
 
 Hairstyle* groom_bob(Fault* fault)
 {
-    static const Look look = {
-        .name = "bob",
-        .seed = 2,
-        .parting_x_m = 0.028f,
-        .parting_end_m = -0.030f,
-        .lift_m = 0.015f,
-        .sweep = 0.0f,
-        .fringe = 0.7f,
-        .face_m = 0.055f,
-        .gather = 0.0f,
-        .gather_z_m = -0.02f,
-        .hem_m = 0.112f,
-        .hem_front_m = 0.006f,
-        .hug = 0.20f,
-        .curl = 0.9f,
-        .curl_m = 0.045f,
-        .least_m = 0.045f,
-        .most_m = 0.32f,
-        .root_colour = {0.200f, 0.120f, 0.056f},
-        .tip_colour = {0.330f, 0.215f, 0.105f},
-    };
-    return make(&look, fault);
+    return make(&looks[LOOK_BOB], fault);
 }
 
 Hairstyle* groom_ponytail(Fault* fault)
 {
-    static const Look look = {
-        .name = "ponytail",
-        .seed = 3,
-        .parting_x_m = 0.0f,
-        .parting_end_m = -0.020f,
-        .lift_m = 0.009f,
-        .least_m = 0.22f,
-        .most_m = 0.32f,
-        .is_tied = true,
-        .band = {0.0f, 0.272f, -0.128f},
-        .band_m = 0.012f,
-        .root_colour = {0.016f, 0.012f, 0.010f},
-        .tip_colour = {0.030f, 0.022f, 0.018f},
-    };
-    return make(&look, fault);
+    return make(&looks[LOOK_PONYTAIL], fault);
+}
+
+Hairstyle* groom_curly(Fault* fault)
+{
+    return make(&looks[LOOK_CURLY], fault);
+}
+
+Hairstyle* groom_short(Fault* fault)
+{
+    return make(&looks[LOOK_SHORT], fault);
 }

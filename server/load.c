@@ -16,9 +16,11 @@
 #define PATH_BYTES      512
 #define BOTH_ENDS_BYTES 512
 
-const char* const load_builtin_styles[] = {"long", "bob", "ponytail", "crest", NULL};
+const char* const load_builtin_styles[] = {"long",  "bob",   "ponytail", "curly",
+                                           "short", "crest", NULL};
 
-static Hairstyle* (*const growers[])(Fault*) = {groom_long, groom_bob, groom_ponytail, crest_style};
+static Hairstyle* (*const growers[])(Fault*) = {groom_long,  groom_bob,   groom_ponytail,
+                                                groom_curly, groom_short, crest_style};
 
 // What options and style file come to: every path as it is opened, every default still zero.
 typedef struct Recipe {

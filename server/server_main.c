@@ -79,7 +79,8 @@ static const struct argp_option option_table[] = {
     {NULL, 0, NULL, 0, "What is simulated:", 1},
     {"scene", KEY_SCENE, "FILE", 0, "Styles, characters and physics from a JSON scene", 1},
     {"style", KEY_STYLE, "NAME|FILE", 0,
-     "long (default), bob, ponytail or crest, a .json style, or .tfx sections (repeat for each)",
+     "long (default), bob, ponytail, curly, short or crest, a .json style, or .tfx sections "
+     "(repeat for each)",
      1},
     {"head", KEY_HEAD, "FILE", 0, "Head mesh (.obj) of a .tfx groom", 1},
     {"unit", KEY_UNIT, "M", 0, "Metres per unit of the groom's files", 1},

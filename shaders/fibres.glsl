@@ -1,15 +1,18 @@
 // How much of a fragment hair covers: fibres side by side on a ribbon.
 //
 // The texture holds ranks: values spread evenly over 0..1, so that `rank > 1 - fill` is true on
-// exactly `fill` of the ribbon, whatever the fill. Averaging would pull ranks to a half and eat
-// thin hair, so every mip level is ranked anew (client/fibres.c).
-uniform sampler2DArray fibre_ranks;
-const int FIBRE_LEVELS = 6; // of mips, as in client/fibres.h
+// exactly `fill` of the ribbon, whatever the fill. Its smaller levels are ranked anew, so that this
+// holds on each of them. Where a fibre is thinner than a pixel, its fill itself is the coverage.
+uniform sampler2DArray fibre_ranks; // rank; which hair, in sixteenths, on level 0
+const int FIBRE_LEVELS = 5; // as in client/fibres.h
 
 // Which hair of the pattern `place` is on.
 int fibre_cell(vec3 place)
 {
-    return int(floor(place.x * 16.0 + 0.4 * sin(12.566371 * place.y)));
+    ivec2 size = textureSize(fibre_ranks, 0).xy;
+    ivec2 at = ivec2(floor(fract(place.xy) * vec2(size)));
+    float hair = texelFetch(fibre_ranks, ivec3(min(at, size - 1), int(place.z)), 0).g;
+    return int(hair * 15.94) + 16 * int(floor(place.x));
 }
 
 // 0 where fibres are wider than a pixel, 1 where they are so thin that their fill is the coverage.
@@ -28,7 +31,8 @@ float fibre_texels(vec3 place)
 float fibre_coverage(vec3 place, float fill)
 {
     float texels = fibre_texels(place);
-    float rank = textureLod(fibre_ranks, place, 0.0).r;
+    float level = clamp(floor(log2(texels) + 0.5), 0.0, 4.0);
+    float rank = textureLod(fibre_ranks, place, level).r;
     float soft = clamp(0.02 * texels, 0.02, 0.5);
     float sharp = clamp((rank - (1.0 - fill)) / soft + 0.5, 0.0, 1.0);
     return mix(sharp, fill, fibre_blur(texels));

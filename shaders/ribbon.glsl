@@ -13,6 +13,15 @@ struct Ribbon {
     float across; // metres from the centre line, before any widening
 };
 
+// Ribbons face the viewer. Those of few and wide wisps lie on the head instead, or their ends would
+// stand off the crown; `half_width` tells them.
+vec3 facing(vec3 towards, vec3 normal, float half_width)
+{
+    float lies = smoothstep(0.003, 0.010, half_width) * 0.7;
+    vec3 out_of_head = normal * (dot(normal, towards) < 0.0 ? -length(towards) : length(towards));
+    return lies > 0.0 ? mix(towards, out_of_head, lies) : towards;
+}
+
 // `eye` is where the viewer stands (eye.w = 1) or the direction it looks from (eye.w = 0).
 // A ribbon is never thinner than `pixel` per metre of distance; its fill then falls instead.
 Ribbon ribbon_vertex(int vertex, vec4 eye, float pixel)
@@ -35,7 +44,7 @@ Ribbon ribbon_vertex(int vertex, vec4 eye, float pixel)
     float least = 0.5 * pixel * (eye.w > 0.0 ? length(towards) : 1.0);
     float half_width = max(p.w, least);
     r.fill = texelFetch(table_offsets, at, 0).w * p.w / half_width;
-    vec3 side = cross(r.tangent, towards);
+    vec3 side = cross(r.tangent, facing(towards, head_rotation * n.xyz, p.w));
     float length2 = dot(side, side);
     r.position += side * (length2 > 1e-20 ? inversesqrt(length2) : 0.0) * edge * half_width;
     return r;
@@ -46,5 +55,5 @@ Ribbon ribbon_vertex(int vertex, vec4 eye, float pixel)
 vec3 fibre_place(float across_m, float along, float random)
 {
     float across = across_m / (16.0 * 0.0008) + fract(random * 61.0);
-    return vec3(across, along * 0.5 + fract(random * 17.0), floor(random * 3.999));
+    return vec3(across, along * 0.5 + fract(random * 17.0), floor(random * 4.0));
 }

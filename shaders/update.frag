@@ -1,6 +1,8 @@
 // Update pass (thesis 5.5): from the guides of two ticks to position, normal and tangent of every
 // ribbon point. Only texelFetch and mix: hardware filters weigh with 8 bits on some GPUs, which is
 // 0.2 mm here. The double-precision twin of this file is messages/drawn.c.
+#include "capsules.glsl"
+#include "turn.glsl"
 uniform sampler2DArray guide_positions; // UNORM16 in the box; layer = tick & 1
 uniform sampler2DArray guide_tangents;  // SNORM16
 uniform sampler2D rest_tangents;        // of the guides at rest; x node, y guide
@@ -44,14 +46,6 @@ vec3 hermite(Node a, Node b, float f)
     return a.position + chord * (f * f * (3.0 - 2.0 * f)) + length(chord) * bend;
 }
 
-// `v` turned by the least rotation that takes unit `from` to unit `to`.
-vec3 turn(vec3 v, vec3 from, vec3 to)
-{
-    vec3 b = cross(from, to);
-    float c = dot(from, to);
-    return c < -0.9999 ? v : v + cross(b, v) + cross(b, cross(b, v)) / (1.0 + c);
-}
-
 void main()
 {
     ivec2 at = ivec2(gl_FragCoord.xy);
@@ -81,7 +75,7 @@ void main()
     bool turns = min(dot(now, now), dot(rest, rest)) > 1e-12;
     rest = turns ? normalize(rest) : vec3(0, -1, 0);
     now = turns ? normalize(now) : rest;
-    out_position = vec4(box_low + position + turn(offset.xyz, rest, now), weights.w);
+    out_position = vec4(push_out(box_low + position + turn(offset.xyz, rest, now)), weights.w);
     out_normal = vec4(turn(rest_normal.xyz, rest, now), rest_normal.w);
     out_tangent = vec4(turn(rest_tangent.xyz, rest, now), rest_tangent.w);
 }

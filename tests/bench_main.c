@@ -330,6 +330,7 @@ static const Study studies[] = {
     {"reference", "our pictures against path-traced ones of the same strands (../shared/assets)",
      study_reference},
     {"shading", "errors and prices of the shadings and of the tables of marschner", study_shading},
+    {"wisps", "how evenly wisps stand on the scalp, and what that costs", study_wisps},
 };
 #define STUDIES (sizeof studies / sizeof studies[0])
 

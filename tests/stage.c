@@ -56,7 +56,7 @@ void stage_move(Stage* stage)
 
 double stage_draw(Stage* stage)
 {
-    stage->drawing.fresh = true;
+    stage->drawing.moved = true;
     int64_t began = base_monotonic_us();
     draw_picture(&stage->drawing, &stage->view, &stage->image);
     return 1e-3 * (double)(base_monotonic_us() - began);

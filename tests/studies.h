@@ -22,6 +22,7 @@ bool study_shadow(Fault* fault);
 bool study_frame(Fault* fault);
 bool study_update(Fault* fault);
 bool study_transparency(Fault* fault);
+bool study_wisps(Fault* fault);
 
 // "# machine: ..." as /proc/cpuinfo names it, and how many cores there are.
 void study_machine(void);

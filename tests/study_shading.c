@@ -155,7 +155,7 @@ static bool open_scene(Scene* scene, const Gl* gl, Fault* fault)
     scene->fibres = fibres_create(gl, fault);
     GuidesView view;
     ShadowOptions shadow = shadow_default();
-    if (scene->fibres == 0 || !hair_create(&scene->hair, gl, scene->style, fault) ||
+    if (scene->fibres == 0 || !hair_create(&scene->hair, gl, scene->style, LOD_FULL, fault) ||
         !shadow_create(&scene->shadow, gl, &shadow, scene->fibres, fault) ||
         !guides_view_init(&view, 0, fault))
         return false;

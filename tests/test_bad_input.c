@@ -62,6 +62,7 @@ static void unknown_options_and_values_are_wrong_usage(void** state)
     expect_refused(&stage, 2, "hair-log", "--nonsense", ARGS(LOG, "--nonsense"));
     expect_refused(&stage, 2, "--rate", "number", ARGS(SERVER, "--rate", "fast"));
     expect_refused(&stage, 2, "--size", "12", ARGS(CLIENT, "--size", "12"));
+    expect_refused(&stage, 2, "--lod", "medium", ARGS(CLIENT, "--lod", "near"));
     // Numbers that are right but for what does not fit 32 bits.
     expect_refused(&stage, 2, "--size", "8192", ARGS(CLIENT, "--size", "4294967360x48"));
     expect_refused(&stage, 2, "--shadows", "opacity", ARGS(CLIENT, "--shadows", "soft"));

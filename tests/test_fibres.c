@@ -19,13 +19,13 @@ const char* __lsan_default_suppressions(void)
     return "leak:libOSMesa.so";
 }
 
-static unsigned char ranks[FIBRES_LAYERS][TEXELS];
+static unsigned char ranks[FIBRES_LAYERS][TEXELS], hairs[FIBRES_LAYERS][TEXELS];
 
 static int make_ranks(void** state)
 {
     (void)state;
     for (int layer = 0; layer < FIBRES_LAYERS; ++layer)
-        if (!fibres_ranks(ranks[layer], layer)) return 1;
+        if (!fibres_ranks(ranks[layer], hairs[layer], layer)) return 1;
     return 0;
 }
 
@@ -107,6 +107,48 @@ static void layers_differ(void** state)
         }
 }
 
+// On every level, for the fills that hair has: what is covered is the fill, so hair gets neither
+// thinner nor thicker where it is further away.
+static void coverage_is_kept_on_every_level(void** state)
+{
+    (void)state;
+    static unsigned char level[2][TEXELS];
+    for (int layer = 0; layer < FIBRES_LAYERS; ++layer) {
+        memcpy(level[0], ranks[layer], TEXELS);
+        for (int l = 1; l < FIBRES_LEVELS; ++l) {
+            int texels = fibres_side(l) * fibres_side(l);
+            assert_true(fibres_halve(level[l & 1], level[~l & 1], fibres_side(l - 1)));
+            for (int step = 1; step < 20; ++step) {
+                int covered = 0;
+                for (int i = 0; i < texels; ++i)
+                    covered += level[l & 1][i] / 255.0 > 1.0 - step / 20.0;
+                double off = (double)covered / texels - step / 20.0;
+                if (fabs(off) > 0.02)
+                    fail_msg("layer %d, level %d: fill %g is off by %g", layer, l, step / 20.0,
+                             off);
+            }
+        }
+    }
+}
+
+// A hair is a run of texels round the highest of them, and all sixteen are there.
+static void every_texel_says_which_hair_it_is_of(void** state)
+{
+    (void)state;
+    for (int layer = 0; layer < FIBRES_LAYERS; ++layer) {
+        int count[FIBRES_STRANDS] = {0}, borders = 0;
+        for (int i = 0; i < TEXELS; ++i) {
+            assert_true(hairs[layer][i] < FIBRES_STRANDS);
+            ++count[hairs[layer][i]];
+            int next = i % FIBRES_SIZE == FIBRES_SIZE - 1 ? i + 1 - FIBRES_SIZE : i + 1;
+            borders += hairs[layer][i] != hairs[layer][next];
+        }
+        for (int s = 0; s < FIBRES_STRANDS; ++s)
+            assert_true(count[s] > 0);
+        assert_true(borders < 24 * FIBRES_SIZE); // a row
+    }
+}
+
 static void texture_holds_the_ranks(void** state)
 {
     (void)state;
@@ -129,9 +171,14 @@ static void texture_holds_the_ranks(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ranks_are_spread_evenly), cmocka_unit_test(coverage_is_the_fill_asked_for),
-        cmocka_unit_test(pattern_tiles_both_ways), cmocka_unit_test(hairs_run_along),
-        cmocka_unit_test(layers_differ),           cmocka_unit_test(texture_holds_the_ranks),
+        cmocka_unit_test(ranks_are_spread_evenly),
+        cmocka_unit_test(coverage_is_the_fill_asked_for),
+        cmocka_unit_test(pattern_tiles_both_ways),
+        cmocka_unit_test(hairs_run_along),
+        cmocka_unit_test(layers_differ),
+        cmocka_unit_test(texture_holds_the_ranks),
+        cmocka_unit_test(coverage_is_kept_on_every_level),
+        cmocka_unit_test(every_texel_says_which_hair_it_is_of),
     };
     return cmocka_run_group_tests(tests, make_ranks, NULL);
 }

@@ -275,9 +275,9 @@ static void unknown_styles_are_told_what_there_is(void** state)
 {
     (void)state;
     Fault fault;
-    LoadOptions options = one_file("curly");
+    LoadOptions options = one_file("mohawk");
     assert_null(load_style(&options, NULL, &fault));
-    assert_non_null(strstr(fault.text, "curly"));
+    assert_non_null(strstr(fault.text, "mohawk"));
     for (int i = 0; load_builtin_styles[i] != NULL; ++i)
         assert_non_null(strstr(fault.text, load_builtin_styles[i]));
     assert_non_null(strstr(fault.text, ".json"));

@@ -359,27 +359,38 @@ static void hair_log_info_counts_ticks_that_lack_rows(void** state)
     }
 }
 
-// v1.lcmlog holds a grown and an imported style and three ticks of each. It is never recorded anew:
-// a build that cannot play it has broken a published type.
-static void a_log_of_version_1_always_plays(void** state)
+// v1.lcmlog holds a grown and an imported style of format 1 and three ticks of each, v2.lcmlog a
+// grown one of format 2. They are never recorded anew: a build that cannot play them has broken a
+// published type. What those formats lack is nothing, and reads as nothing.
+static void logs_of_older_formats_always_play(void** state)
 {
     (void)state;
     static const struct {
-        int slot;
+        const char* file;
+        int slot, holds;
         uint64_t payload_hash;
-    } held[] = {{0, 0xb478c9a9d9a6727b}, {7, 0x3c667132ffb783e2}};
+    } held[] = {{SOURCE_DIR "/tests/v1.lcmlog", 0, 0, 0xb478c9a9d9a6727b},
+                {SOURCE_DIR "/tests/v1.lcmlog", 7, 0, 0x3c667132ffb783e2},
+                {SOURCE_DIR "/tests/v2.lcmlog", 0, 1, 0x7ad8176df9361bf3}};
     for (size_t i = 0; i < sizeof held / sizeof held[0]; ++i) {
         Fault fault = {""};
         GuidesView view;
         Receive* receive = receive_create(&held[i].slot, 1, (Notice){NULL, NULL}, &fault);
         assert_true(receive != NULL && guides_view_init(&view, held[i].slot, &fault));
-        Playback* playback = playback_open(SOURCE_DIR "/tests/v1.lcmlog", held[i].slot, 0, &fault);
+        Playback* playback = playback_open(held[i].file, held[i].slot, 0, &fault);
         if (playback == NULL || !playback_feed_styles(playback, receive, &fault) ||
             !playback_feed_tick(playback, 2, receive, &fault))
             fail_msg("%s", fault.text);
         assert_true(receive_take(receive, &view) && view.complete);
         assert_true(frame_payload_hash(view.positions[0], view.tangents[0], view.guides,
                                        view.nodes) == held[i].payload_hash);
+        int version;
+        bool complete;
+        const Hairstyle* style = receive_style(receive, view.style_hash, &version, &complete);
+        assert_true(style != NULL && complete && style->hold_count == held[i].holds);
+        static const WispForm plain;
+        assert_memory_equal(&style->forms[0], &plain, sizeof plain);
+        assert_true(style->magnet_count == 0 && style->maps == NULL);
         playback_close(playback);
         guides_view_free(&view);
         receive_destroy(receive);
@@ -398,7 +409,7 @@ int main(void)
         cmocka_unit_test(playback_lists_epochs_where_there_are_several),
         cmocka_unit_test(playback_lists_slots_where_the_one_is_not_there),
         cmocka_unit_test(playback_survives_a_log_damaged_anywhere),
-        cmocka_unit_test(a_log_of_version_1_always_plays),
+        cmocka_unit_test(logs_of_older_formats_always_play),
         cmocka_unit_test(hair_log_info_tells_what_a_log_holds),
         cmocka_unit_test(hair_log_info_counts_ticks_that_lack_rows),
     };

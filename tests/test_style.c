@@ -89,6 +89,14 @@ static Hairstyle* small_style(void)
     s->hold_count = 2;
     s->holds[0] = (Hold){HOLD_BAND, 0, 4, 1};
     s->holds[1] = (Hold){HOLD_CLOTH, 4, 3, 0};
+    s->forms[0] = (WispForm){0.1f, 0.2f, 0.01f, -3.0f, 0.4f, 0.5f, 0.6f};
+    s->forms[1] = (WispForm){.taper = 0.7f};
+    s->magnet_count = 2;
+    s->magnets[0] = (Magnet){{0.1f, 0.2f, 0.3f}, 0.04f, -0.5f};
+    s->magnets[1] = (Magnet){{-0.1f, 0.25f, 0}, 0.03f, 1.0f};
+    assert_true(hairstyle_add_maps(s, NULL));
+    for (int i = 0; i < s->guide_count * MAP_COUNT; ++i)
+        s->maps[i] = (uint8_t)(3 * i);
     s->head_kind = HEAD_MESH;
     s->head_centre = vec3(0, 0.216f, 0);
     fill_head(&s->head);
@@ -152,6 +160,25 @@ static bool break_hold(Hairstyle* s, int what)
     if (what == count) s->hold_count = HAIRSTYLE_MAX_HOLDS + 1;
     if (what == count + 1) s->colliders[1].body = BODY_COUNT;
     return what >= 0 && what <= count + 1;
+}
+
+static bool break_form(Hairstyle* s, int what)
+{
+    const WispForm wrong[] = {
+        {.belly = -0.1f},         {.taper = 1.1f},           {.curl_radius_m = NAN},
+        {.curl_turns = INFINITY}, {.curl_stiffness = -0.1f}, {.rotation_rad = 7.0f},
+        {.clump = 1.5f}};
+    const Magnet magnets[] = {
+        {{NAN, 0, 0}, 0.1f, 1.0f}, {{0, 0, 0}, -0.1f, 1.0f}, {{0, 0, 0}, 0.1f, 1.1f}};
+    int forms = (int)(sizeof wrong / sizeof wrong[0]);
+    if (what < 0 || what > forms + 3) return false;
+    if (what < forms)
+        s->forms[1] = wrong[what];
+    else if (what < forms + 3)
+        s->magnets[1] = magnets[what - forms];
+    else
+        s->magnet_count = HAIRSTYLE_MAX_MAGNETS + 1;
+    return true;
 }
 
 // Each breaks one thing; the audit must see it.
@@ -275,14 +302,14 @@ static void break_style(Hairstyle* s, int what)
             s->strands[i].guide[0] = s->strands[i].guide[1] = s->strands[i].guide[2] = 4;
         break;
     default:
-        assert_true(break_hold(s, what - 38));
+        assert_true(break_hold(s, what - 38) || break_form(s, what - 46));
     }
 }
 
 static void hairstyle_validate_sees_every_broken_thing(void** state)
 {
     (void)state;
-    for (int what = 0; what <= 45; ++what) {
+    for (int what = 0; what <= 56; ++what) {
         Hairstyle* s = small_style();
         break_style(s, what);
         Fault fault = {0};
@@ -340,6 +367,11 @@ static void style_round_trip_keeps_everything(void** state)
     assert_memory_equal(a->colliders, b->colliders, sizeof(Collider) * 2);
     assert_int_equal(b->hold_count, 2);
     assert_memory_equal(a->holds, b->holds, sizeof(Hold) * 2);
+    assert_memory_equal(a->forms, b->forms, sizeof(WispForm) * 2);
+    assert_int_equal(b->magnet_count, 2);
+    assert_memory_equal(a->magnets, b->magnets, sizeof(Magnet) * 2);
+    assert_non_null(b->maps);
+    assert_memory_equal(a->maps, b->maps, 7 * MAP_COUNT);
     assert_memory_equal(&a->material, &b->material, sizeof a->material);
     assert_memory_equal(&a->box, &b->box, sizeof a->box);
     assert_memory_equal(&a->head_centre, &b->head_centre, sizeof a->head_centre);
@@ -351,6 +383,25 @@ static void style_round_trip_keeps_everything(void** state)
     hairstyle_destroy(a);
     hairstyle_destroy(b);
     style_bytes_free(&bytes);
+}
+
+// A style without them is sent without them, and its wisps are as a neutral map would have them.
+static void style_without_maps_carries_none(void** state)
+{
+    (void)state;
+    Hairstyle* s = small_style();
+    StyleBytes with = encode(s);
+    free(s->maps);
+    s->maps = NULL;
+    StyleBytes without = encode(s);
+    assert_int_equal(with.size[STYLE_FAST] - without.size[STYLE_FAST], 7 * MAP_COUNT);
+    Hairstyle* b = decode_fast(without.lane[0], without.size[0], NULL);
+    assert_non_null(b);
+    assert_null(b->maps);
+    hairstyle_destroy(b);
+    hairstyle_destroy(s);
+    style_bytes_free(&with);
+    style_bytes_free(&without);
 }
 
 static void style_identity_ignores_bytes_behind_names_and_sees_both_lanes(void** state)
@@ -702,6 +753,7 @@ int main(void)
         cmocka_unit_test(hairstyle_box_holds_every_pose_of_its_guides),
         cmocka_unit_test(hairstyle_validate_sees_every_broken_thing),
         cmocka_unit_test(style_round_trip_keeps_everything),
+        cmocka_unit_test(style_without_maps_carries_none),
         cmocka_unit_test(style_identity_ignores_bytes_behind_names_and_sees_both_lanes),
         cmocka_unit_test(style_of_grown_sets_needs_no_bulk_lane),
         cmocka_unit_test(style_too_large_for_the_fast_lane_says_what_to_cut),

@@ -131,8 +131,9 @@ static Vec3d turned(const Bench* bench, const Planes* planes, DrawnPoint point, 
 static Vec3d reference(const Bench* bench, const Planes* planes, int i)
 {
     DrawnPoint point = ribbons_point(&bench->ribbons, i);
-    return drawn_position(&point, bench->style->nodes, planes->positions, planes->tangents,
-                          bench->rest_tangents, NULL);
+    Vec3d at = drawn_position(&point, bench->style->nodes, planes->positions, planes->tangents,
+                              bench->rest_tangents, NULL);
+    return drawn_push_out(at, bench->ribbons.colliders, bench->ribbons.collider_count);
 }
 
 static double distance(Vec3d a, const float* b)
