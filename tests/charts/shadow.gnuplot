@@ -27,7 +27,7 @@ do for [scene in "long bob"] {
         "The same on a bob")
     set ylabel "rms error of transmittance"
     set xlabel "processor time of the shadow pass, ms (all threads)"
-    set xrange [5:6000]
+    set xrange [10:700]
     set yrange [0.05:0.6]
     if (scene eq "bob") {set key at screen 0.715, screen 0.64 left top}
     plot of("groom", scene, "$3 == \"depth\"") using 16:12 with linespoints pointtype 7 \
