@@ -151,8 +151,10 @@ static void begin_frame(Drawing* drawing, const GuidesView* view)
     float aspect = (float)drawing->options.width / (float)drawing->options.height, rotation[9];
     frame->camera = camera_orbit(&drawing->camera, drawing->hair.style, aspect);
     quat_matrix(rotation, view->pose.orientation);
-    if (memcmp(frame->rotation, rotation, sizeof rotation) != 0) drawing->moved = true;
-    memcpy(frame->rotation, rotation, sizeof rotation);
+    for (int i = 0; i < 9; ++i) {
+        if (frame->rotation[i] != rotation[i]) drawing->moved = true;
+        frame->rotation[i] = rotation[i];
+    }
 }
 
 static void run_shadow(Drawing* drawing, const GuidesView* view)

@@ -518,6 +518,7 @@ typedef struct Bound {
 // ray crosses. Mean transmittance is 0.09 on `long` and 0.12 on `bob`.
 static void expect_groom(const Stage* stage, const char* name, const Bound* bounds, int count)
 {
+    int beyond = 0;
     Groom groom = open_groom(stage, name);
     for (int i = 0; i < count; ++i) {
         ShadowOptions options = {.method = shadow_find_method(bounds[i].method),
@@ -529,24 +530,27 @@ static void expect_groom(const Stage* stage, const char* name, const Bound* boun
         printf("%s, %s %d, %d texels: rms %.4f (at most %.4f), max %.3f, bias %+.4f\n", name,
                bounds[i].method, bounds[i].layers, bounds[i].size, error.rms, bounds[i].rms,
                error.max, error.bias);
-        assert_true(error.rms <= bounds[i].rms);
+        beyond += error.rms > bounds[i].rms;
     }
     close_groom(&groom);
+    assert_int_equal(beyond, 0);
 }
 
 static void long_hair_is_shaded_as_its_strips_do(void** state)
 {
-    static const Bound bounds[] = {{"depth", 512, 0, 0.3591},    {"opacity", 512, 16, 0.1494},
-                                   {"opacity", 512, 32, 0.1163}, {"deep", 256, 4, 0.0864},
-                                   {"deep", 512, 3, 0.0856},     {"deep", 512, 4, 0.0767}};
+    static const Bound bounds[] = {{"depth", 512, 0, 0.3794},    {"opacity", 512, 16, 0.1682},
+                                   {"opacity", 512, 32, 0.1263}, {"layered", 512, 32, 0.1283},
+                                   {"deep", 64, 4, 0.1620},      {"deep", 256, 4, 0.0965},
+                                   {"deep", 512, 3, 0.0889},     {"deep", 512, 4, 0.0796}};
     expect_groom(stage_of(state), "long", bounds, sizeof bounds / sizeof *bounds);
 }
 
 static void a_bob_is_shaded_as_its_strips_do(void** state)
 {
-    static const Bound bounds[] = {{"depth", 512, 0, 0.2974},    {"opacity", 512, 16, 0.1268},
-                                   {"opacity", 512, 32, 0.0998}, {"deep", 256, 4, 0.0881},
-                                   {"deep", 512, 3, 0.0917},     {"deep", 512, 4, 0.0810}};
+    static const Bound bounds[] = {{"depth", 512, 0, 0.3187},    {"opacity", 512, 16, 0.1427},
+                                   {"opacity", 512, 32, 0.1150}, {"layered", 512, 32, 0.1107},
+                                   {"deep", 256, 4, 0.1018},     {"deep", 512, 3, 0.1060},
+                                   {"deep", 512, 4, 0.0927}};
     expect_groom(stage_of(state), "bob", bounds, sizeof bounds / sizeof *bounds);
 }
 
