@@ -91,7 +91,7 @@ static const struct argp_option arguments[] = {
     {"view", KEY_VIEW, "NAME", 0,
      "shaded (default); coverage: hair as linear grey; transmittance: how much key light arrives",
      0},
-    {"shadows", KEY_SHADOWS, "NAME", 0, "none, depth (default), opacity, layered or deep", 0},
+    {"shadows", KEY_SHADOWS, "NAME", 0, "none, depth, opacity, layered or deep (default)", 0},
     {"shadow-size", KEY_SHADOW_SIZE, "N", 0, "texels across a shadow map: 64 to 1024 (default 512)",
      0},
     {"shadow-layers", KEY_SHADOW_LAYERS, "N", 0,

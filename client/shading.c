@@ -51,7 +51,7 @@ ShadingOptions shading_default(void)
                               .through = 2.5f,
                               .diffuse = 1.0f,
                               .wrap = 1.0f,
-                              .most = 1.0f,
+                              .most = 0.5f,
                               .table_size = 64,
                               .format = TABLE_HALF,
                               .layout = LAYOUT_ENDS};

@@ -54,7 +54,7 @@ int shadow_find_method(const char* name)
 
 ShadowOptions shadow_default(void)
 {
-    return (ShadowOptions){.method = shadow_find_method("depth"),
+    return (ShadowOptions){.method = shadow_find_method("deep"),
                            .size = 512}; // 1.2 mm a texel on long hair
 }
 

@@ -37,7 +37,7 @@ void main()
                 SKY * (0.7 + 0.3 * normal.y) * v_albedo.rgb;
     vec3 half_way = normalize(view + key_direction);
     skin += 0.02 * KEY * lit * pow(max(dot(normal, half_way), 0.0), 24.0);
-    Strand strand = Strand(normalize(v_tangent + vec3(1e-6)), normal, root_colour, 0.0);
+    Strand strand = Strand(normalize(v_tangent + vec3(1e-6)), normal, root_colour, 0.0, 1.0);
     vec3 scalp = KEY * lit * strand_shade(strand, key_direction, view).body +
                  0.35 * RIM * strand_shade(strand, rim_direction, view).body +
                  0.35 * SKY * root_colour;

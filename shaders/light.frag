@@ -20,10 +20,12 @@ void main()
     float along = tangent.w;
     vec3 view = normalize(eye - position);
     Strand strand = Strand(normalize(head_rotation * tangent.xyz), normalize(normal),
-                           mix(root_colour, tip_colour, along), along);
+                           mix(root_colour, tip_colour, along), along, 1.0);
     Lobes sum = scaled(strand_shade(strand, key_direction, view), KEY * hair_lit(position));
     // Deeper hair sees less of what casts no shadow here.
     float open = 0.35 + 0.65 * smoothstep(0.0, 0.6, along);
+    // They have no shadows, so what would reach a strand through others would reach all: too much.
+    strand.among = 0.0;
     sum = added(sum, scaled(strand_shade(strand, fill_direction, view), FILL * open));
     sum = added(sum, scaled(strand_shade(strand, rim_direction, view), RIM * open));
     out_body = vec4(sum.body + SKY * open * (0.6 + 0.4 * normal.y) * strand.colour, 1.0);

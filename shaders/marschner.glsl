@@ -65,7 +65,7 @@ Lobes marschner_shade(Strand s, vec3 light, vec3 view)
     float lit = mix(1.0, faces(s.normal, light), marschner_wrap);
     // What other fibres send on has crossed pigment once more than this fibre's own.
     vec3 hue = s.colour / max(largest(s.colour), 1e-6);
-    vec3 through = (1.0 + (marschner_through - 1.0) * hue) * (m.y * tt + m.z * trt);
+    vec3 through = (1.0 + s.among * (marschner_through - 1.0) * hue) * (m.y * tt + m.z * trt);
     vec3 body = through * min(1.0, marschner_most / max(largest(through), 1e-6)) +
                 diffuse * s.colour;
     return Lobes(body * lit, marschner_shine * (min(m.x * r, marschner_most) * lit));

@@ -3,6 +3,7 @@ struct Strand {
     vec3 tangent, normal; // root to tip; away from the head
     vec3 colour;
     float along; // 0 root to 1 tip
+    float among; // 1: other fibres send it light that they let through; 0: it stands alone
 };
 
 // Radiance in two parts: what has the hair's colour, and the first highlight, which has the

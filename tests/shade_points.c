@@ -25,7 +25,7 @@ static const char shader[] =
     "    vec3 light = light_along.xyz, view = texelFetch(views, at, 0).xyz;\n"
     "    vec3 tangent = texelFetch(tangents, at, 0).xyz;\n"
     "    Strand strand = Strand(tangent, vec3(0), mix(root_colour, tip_colour, light_along.w),\n"
-    "                           light_along.w);\n"
+    "                           light_along.w, 1.0);\n"
     "    Lobes lobes = EXPRESSION;\n"
     "    out_body = vec4(lobes.body, 1);\n"
     "    out_shine = vec4(lobes.shine, 1);\n"

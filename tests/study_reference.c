@@ -18,7 +18,7 @@
 #define PITCH_DEG 5.0f
 #define BINS      90 // of the strand angle, 2 degrees each
 #define REGION    16
-#define FRAMES    5 // timed, after one that is not
+#define FRAMES    3 // timed, after one that is not
 
 typedef struct View {
     const char* name;
