@@ -8,6 +8,7 @@ typedef struct Body {
     GLuint vao, vertices, indices;
     int index_count; // 0: nothing to draw
     Box box;         // of its positions, head space
+    bool closed;     // no back face is ever seen
 } Body;
 
 // Builds from the style's head mesh or the mannequin. `ribbons` tell where hair grows: the skin
