@@ -25,6 +25,7 @@ typedef struct Frame {
     Camera camera;
     float rotation[9];           // of the head, row-major
     Box bounds;                  // what hair fills now
+    Box drawn;                   // what holds all that is drawn, at least
     float lit_low_m, lit_high_m; // ... and from where to where along the key light
 } Frame;
 

@@ -37,6 +37,7 @@ typedef struct Shade {
     GLuint multisampled, colour, depth; // framebuffer and renderbuffers
     GLuint resolved, resolved_texture;  // one sample a pixel, linear, RGBA16F
     GLuint output, output_texture;      // sRGB, RGBA8
+    GLuint backdrop, backdrop_texture;  // the same without hair and head
     GLuint vao;
     Lights lights;
 } Shade;

@@ -1,5 +1,6 @@
 #include "client/shadow.h"
 
+#include "client/extent.h"
 #include "client/program.h"
 #include "client/shadow_map.h"
 
@@ -109,23 +110,9 @@ static void fit(ShadowMap* map, Vec3 light, Box box, float low_m, float high_m, 
     map->matrix = matrix_mul(&ortho, &view);
 }
 
-// The box round a rotated box.
-static Box rotate_box(Box box, const float r[9])
-{
-    Vec3 middle = vec3_scale(vec3_add(box.low, box.high), 0.5f);
-    Vec3 half = vec3_scale(vec3_sub(box.high, box.low), 0.5f);
-    Vec3 m = vec3(r[0] * middle.x + r[1] * middle.y + r[2] * middle.z,
-                  r[3] * middle.x + r[4] * middle.y + r[5] * middle.z,
-                  r[6] * middle.x + r[7] * middle.y + r[8] * middle.z);
-    Vec3 h = vec3(fabsf(r[0]) * half.x + fabsf(r[1]) * half.y + fabsf(r[2]) * half.z,
-                  fabsf(r[3]) * half.x + fabsf(r[4]) * half.y + fabsf(r[5]) * half.z,
-                  fabsf(r[6]) * half.x + fabsf(r[7]) * half.y + fabsf(r[8]) * half.z);
-    return (Box){vec3_sub(m, h), vec3_add(m, h)};
-}
-
 static int draw_body(Shadow* shadow, const Gl* gl, const Body* body, Vec3 light, const Frame* frame)
 {
-    Box box = body->index_count > 0 ? rotate_box(body->box, frame->rotation) : frame->bounds;
+    Box box = body->index_count > 0 ? box_rotate(body->box, frame->rotation) : frame->bounds;
     float middle = 0.5f * vec3_dot(vec3_add(box.low, box.high), light);
     float radius = 0.5f * vec3_length(vec3_sub(box.high, box.low)) + 0.005f;
     fit(&shadow->body, light, box, middle - radius, middle + radius, shadow->options.size);
