@@ -239,14 +239,14 @@ bool body_build(Body* body, const Gl* gl, const Hairstyle* style, const Ribbons*
     bool built = mannequin_mesh(&mesh, style->material.skin_colour, fault) &&
                  build_from(body, gl, &mesh, style, ribbons, fault);
     head_mesh_free(&mesh);
-    body->closed = true;
+    body->is_mannequin = true;
     return built;
 }
 
 int body_draw(const Body* body, const Gl* gl)
 {
     if (body->index_count == 0) return 0;
-    if (body->closed) gl->Enable(GL_CULL_FACE);
+    if (body->is_mannequin) gl->Enable(GL_CULL_FACE);
     gl->BindVertexArray(body->vao);
     gl->DrawElements(GL_TRIANGLES, body->index_count, GL_UNSIGNED_INT, NULL);
     gl->Disable(GL_CULL_FACE);

@@ -8,7 +8,8 @@ typedef struct Body {
     GLuint vao, vertices, indices;
     int index_count; // 0: nothing to draw
     Box box;         // of its positions, head space
-    bool closed;     // no back face is ever seen
+    // The mannequin's: no back face is ever seen; vertices lie as near as shadows are soft.
+    bool is_mannequin;
 } Body;
 
 // Builds from the style's head mesh or the mannequin. `ribbons` tell where hair grows: the skin

@@ -275,6 +275,7 @@ int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* 
     draw_background(shade, gl);
     use_program(shade, gl, shade->body_program, shadow, hair, frame);
     shading_bind(&light->shading, gl, shade->body_program);
+    gl->Uniform1i(program_uniform(gl, shade->body_program, "fine_mesh"), hair->body.is_mannequin);
     int calls = body_draw(&hair->body, gl);
     light_show(light, gl);
     if (shade->options.pre_z) {

@@ -25,12 +25,13 @@ float hair_transmittance(vec3 position)
     return sum * 0.2;
 }
 
-// On skin: sixteen texels, since whole shadows of single ribbons are seen there.
-float hair_transmittance_wide(vec3 position)
+// On skin: sixteen texels, since whole shadows of single ribbons are seen there. `taps` is 16, or 0
+// where the answer is not needed.
+float hair_transmittance_wide(vec3 position, int taps)
 {
     vec3 at = light_place(hair_light_matrix, position);
     float sum = 0.0;
-    for (int i = 0; i < 16; ++i)
+    for (int i = 0; i < taps; ++i)
         sum += below_first_hair(at, ivec2(2 * (i & 3) - 3, 2 * (i >> 2) - 3));
     return sum / 16.0;
 }

@@ -48,13 +48,14 @@ float hair_transmittance(vec3 position)
     return mix(mixed.x, mixed.y, f.x);
 }
 
-// On skin: sixteen texels, since whole shadows of single ribbons are seen there.
-float hair_transmittance_wide(vec3 position)
+// On skin: sixteen texels, since whole shadows of single ribbons are seen there. `taps` is 16, or 0
+// where the answer is not needed.
+float hair_transmittance_wide(vec3 position, int taps)
 {
     vec3 at = light_place(hair_light_matrix, position);
     float z = at.z - hair_bias / hair_light_span, sum = 0.0;
     ivec2 texel = ivec2(floor(at.xy * vec2(textureSize(hair_layers, 0).xy)));
-    for (int i = 0; i < 16; ++i)
+    for (int i = 0; i < taps; ++i)
         sum += texel_transmittance(texel + ivec2(2 * (i & 3) - 3, 2 * (i >> 2) - 3), z);
     return sum / 16.0;
 }
