@@ -13,9 +13,11 @@ typedef struct Body {
 } Body;
 
 // Builds from the style's head mesh or the mannequin. `ribbons` tell where hair grows: the skin
-// near roots is shaded as scalp with their tangents. A style without a head gives an empty body.
+// near roots is shaded as scalp with their tangents. A style without a head gives an empty body,
+// and so does a head mesh with vertices further apart (`spacing` above 1): only the mannequin has
+// these.
 bool body_build(Body* body, const Gl* gl, const Hairstyle* style, const Ribbons* ribbons,
-                Fault* fault);
+                float spacing, Fault* fault);
 // Returns the draw calls: 1, or 0 for an empty body.
 int body_draw(const Body* body, const Gl* gl);
 void body_free(Body* body, const Gl* gl);

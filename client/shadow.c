@@ -110,8 +110,9 @@ static void fit(ShadowMap* map, Vec3 light, Box box, float low_m, float high_m, 
     map->matrix = matrix_mul(&ortho, &view);
 }
 
-static int draw_body(Shadow* shadow, const Gl* gl, const Body* body, Vec3 light, const Frame* frame)
+static int draw_body(Shadow* shadow, const Gl* gl, const Hair* hair, Vec3 light, const Frame* frame)
 {
+    const Body* body = &hair->body;
     Box box = body->index_count > 0 ? box_rotate(body->box, frame->rotation) : frame->bounds;
     float middle = 0.5f * vec3_dot(vec3_add(box.low, box.high), light);
     float radius = 0.5f * vec3_length(vec3_sub(box.high, box.low)) + 0.005f;
@@ -122,7 +123,7 @@ static int draw_body(Shadow* shadow, const Gl* gl, const Body* body, Vec3 light,
     gl->DepthMask(GL_TRUE);
     gl->ClearDepth(1.0);
     gl->Clear(GL_DEPTH_BUFFER_BIT);
-    return shadow->method->draw == NULL ? 0 : body_draw(body, gl);
+    return shadow->method->draw == NULL ? 0 : body_draw(hair_body(hair, shadow->body.texel_m), gl);
 }
 
 int shadow_run(Shadow* shadow, const Gl* gl, const Hair* hair, Vec3 light, const Frame* frame)
@@ -132,7 +133,7 @@ int shadow_run(Shadow* shadow, const Gl* gl, const Hair* hair, Vec3 light, const
         shadow->options.size);
     if (shadow->method->draw != NULL)
         calls += shadow->method->draw(shadow, gl, hair, light, frame->rotation);
-    return calls + draw_body(shadow, gl, &hair->body, light, frame);
+    return calls + draw_body(shadow, gl, hair, light, frame);
 }
 
 void shadow_samplers(const Gl* gl, GLuint program)

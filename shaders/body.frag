@@ -20,11 +20,10 @@ vec3 lambert(vec3 normal, vec3 light, vec3 albedo)
     return albedo * INV_PI * clamp((dot(normal, light) + wrap) / (1.0 + wrap), 0.0, 1.0);
 }
 
-// Where all vertices are in full light, or as dark as hair makes it, so is what lies between them;
-// and most scalp is hidden. Elsewhere shadows have edges that are finer than triangles.
+// Where all vertices are in full light or in none, so is what lies between them; and most scalp is hidden. Elsewhere shadows have edges that are finer than triangles.
 float key_lit(vec3 normal)
 {
-    bool even = fine_mesh != 0 && (v_lit < 0.075 || v_lit > 0.99 || v_albedo.a > 0.5);
+    bool even = fine_mesh != 0 && (v_lit < 0.01 || v_lit > 0.99 || v_albedo.a > 0.5);
     float lit = skin_lit(v_position, normal, !even);
     return even ? v_lit : lit;
 }
