@@ -160,6 +160,9 @@ static void begin_frame(Drawing* drawing, const GuidesView* view)
     Frame* frame = &drawing->frame;
     float aspect = (float)drawing->options.width / (float)drawing->options.height, rotation[9];
     frame->camera = camera_orbit(&drawing->camera, drawing->hair.style, aspect);
+    frame->pixel_m =
+        shade_pixel_angle(&drawing->shade, &frame->camera) * vec3_length(frame->camera.eye);
+    if (shadow_resize(&drawing->shadow, frame)) drawing->lit = true;
     quat_matrix(rotation, view->pose.orientation);
     for (int i = 0; i < 9; ++i) {
         if (frame->rotation[i] != rotation[i]) drawing->moved = true;

@@ -8,7 +8,7 @@
 // and ears keep their outline.
 static const struct {
     float pixel_m, spacing;
-} coarser[HAIR_COARSER] = {{0.0011f, 1.5f}, {0.0040f, 3.0f}};
+} coarser[HAIR_COARSER] = {{0.0013f, 1.5f}, {0.0040f, 3.0f}};
 
 static bool build_bodies(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault)
 {

@@ -204,8 +204,7 @@ void shade_free(Shade* shade, const Gl* gl)
     memset(shade, 0, sizeof *shade);
 }
 
-// Metres that a pixel spans at one metre.
-static float pixel_angle(const Shade* shade, const Camera* camera)
+float shade_pixel_angle(const Shade* shade, const Camera* camera)
 {
     return 2.0f / camera->projection.m[1][1] / (float)shade->options.height;
 }
@@ -225,7 +224,7 @@ static void use_program(const Shade* shade, const Gl* gl, GLuint program, const 
     program_uniform3(gl, program, "eye", camera->eye);
     lights_bind(&shade->lights, gl, program);
     program_uniform3(gl, program, "root_colour", material->root_colour);
-    gl->Uniform1f(program_uniform(gl, program, "pixel_angle"), pixel_angle(shade, camera));
+    gl->Uniform1f(program_uniform(gl, program, "pixel_angle"), shade_pixel_angle(shade, camera));
     gl->Uniform1i(program_uniform(gl, program, "coverage_only"),
                   shade->options.view == VIEW_COVERAGE);
     gl->Uniform1i(program_uniform(gl, program, "transmittance_only"),
@@ -280,8 +279,7 @@ int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* 
     draw_background(shade, gl);
     use_program(shade, gl, shade->body_program, shadow, hair, frame);
     shading_bind(&light->shading, gl, shade->body_program);
-    const Body* body =
-        hair_body(hair, pixel_angle(shade, &frame->camera) * vec3_length(frame->camera.eye));
+    const Body* body = hair_body(hair, frame->pixel_m);
     gl->Uniform1i(program_uniform(gl, shade->body_program, "fine_mesh"), body->is_mannequin);
     int calls = body_draw(body, gl);
     light_show(light, gl);

@@ -52,6 +52,9 @@ void shade_free(Shade* shade, const Gl* gl);
 // Whether hair must be sorted before a picture, by what, and which comes first.
 bool shade_sorts(const Shade* shade, OrderBy* by, bool* far_first);
 
+// Metres that a pixel spans at one metre.
+float shade_pixel_angle(const Shade* shade, const Camera* camera);
+
 // Draws one picture of `hair`. Returns the draw calls made.
 int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* shadow,
               const Light* light, const Frame* frame);

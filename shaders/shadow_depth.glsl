@@ -8,7 +8,7 @@ const float HAIR_THICKEST_M = 0.03;
 
 float below_first_hair(vec3 at, ivec2 shift)
 {
-    ivec2 size = textureSize(hair_depth, 0), texel = ivec2(floor(at.xy * vec2(size))) + shift;
+    ivec2 size = ivec2(shadow_size), texel = ivec2(floor(at.xy * vec2(size))) + shift;
     if (!is_in_map(texel, size)) return 1.0;
     // Not behind the far plane: there a texel without hair would be hair.
     float dz = (min(at.z, 1.0) - texelFetch(hair_depth, texel, 0).r) * hair_light_span - hair_bias;

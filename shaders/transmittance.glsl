@@ -7,7 +7,7 @@ const float BODY_BIAS_M = 0.004; // skin and roots lie on the surface that casts
 
 float body_texel(vec3 at, ivec2 shift)
 {
-    ivec2 size = textureSize(body_depth, 0), texel = ivec2(floor(at.xy * vec2(size))) + shift;
+    ivec2 size = ivec2(shadow_size), texel = ivec2(floor(at.xy * vec2(size))) + shift;
     if (!is_in_map(texel, size)) return 1.0;
     float dz = (at.z - texelFetch(body_depth, texel, 0).r) * body_light_span;
     return dz > BODY_BIAS_M ? 0.0 : 1.0;
@@ -18,7 +18,7 @@ float body_light(vec3 position, int taps)
     // Three by three texels, the outer ones weighed by where the point lies in the middle one: edges
     // fade over two texels without steps.
     vec3 at = light_place(body_light_matrix, position);
-    vec2 f = fract(at.xy * vec2(textureSize(body_depth, 0)));
+    vec2 f = fract(at.xy * vec2(ivec2(shadow_size)));
     float sum = 0.0;
     for (int i = 0; i < taps; ++i) {
         int x = i % 3 - 1, y = i / 3 - 1;
