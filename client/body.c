@@ -229,24 +229,27 @@ static bool build_from(Body* body, const Gl* gl, const HeadMesh* mesh, const Hai
 }
 
 bool body_build(Body* body, const Gl* gl, const Hairstyle* style, const Ribbons* ribbons,
-                Fault* fault)
+                float spacing, Fault* fault)
 {
     memset(body, 0, sizeof *body);
-    if (style->head_kind == HEAD_MESH)
+    if (style->head_kind == HEAD_MESH && spacing == 1.0f)
         return build_from(body, gl, &style->head, style, ribbons, fault);
     if (style->head_kind != HEAD_MANNEQUIN) return true;
     HeadMesh mesh = {0};
-    bool built = mannequin_mesh(&mesh, style->material.skin_colour, fault) &&
+    bool built = mannequin_mesh(&mesh, spacing, style->material.skin_colour, fault) &&
                  build_from(body, gl, &mesh, style, ribbons, fault);
     head_mesh_free(&mesh);
+    body->is_mannequin = true;
     return built;
 }
 
 int body_draw(const Body* body, const Gl* gl)
 {
     if (body->index_count == 0) return 0;
+    if (body->is_mannequin) gl->Enable(GL_CULL_FACE);
     gl->BindVertexArray(body->vao);
     gl->DrawElements(GL_TRIANGLES, body->index_count, GL_UNSIGNED_INT, NULL);
+    gl->Disable(GL_CULL_FACE);
     return 1;
 }
 

@@ -23,8 +23,10 @@ typedef struct Camera {
 // What all passes of one picture share. Axes are the world's, places relative to the head's.
 typedef struct Frame {
     Camera camera;
+    float pixel_m;               // what a pixel spans at the head
     float rotation[9];           // of the head, row-major
     Box bounds;                  // what hair fills now
+    Box drawn;                   // what holds all that is drawn, at least
     float lit_low_m, lit_high_m; // ... and from where to where along the key light
 } Frame;
 

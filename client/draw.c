@@ -1,5 +1,6 @@
 #include "client/draw.h"
 
+#include "client/extent.h"
 #include "client/fibres.h"
 #include "messages/quantise.h"
 
@@ -55,6 +56,8 @@ bool draw_set_style(Drawing* drawing, const Hairstyle* style, uint64_t hash, int
     if (drawing->options.has_colour) shading_colour(drawing->options.colour, &hair.material);
     hair_free(&drawing->hair, drawing->gl);
     drawing->hair = hair;
+    drawing->still = extent_still(&hair);
+    drawing->stray_m = extent_stray(&hair.ribbons);
     drawing->style_hash = hash;
     drawing->style_version = version;
     drawing->has_style = drawing->moved = true;
@@ -98,6 +101,13 @@ static void find_bounds(const Drawing* drawing, const GuidesView* view, Frame* f
         }
     }
     frame->bounds = (Box){vec3_sub(box.low, margin), vec3_add(box.high, margin)};
+    frame->drawn = frame->bounds;
+    Vec3 stray = {drawing->stray_m, drawing->stray_m, drawing->stray_m};
+    if (style->guide_count > 0)
+        frame->drawn =
+            (Box){vec3_sub(frame->bounds.low, stray), vec3_add(frame->bounds.high, stray)};
+    if (drawing->still.low.x <= drawing->still.high.x)
+        frame->drawn = box_join(frame->drawn, box_rotate(drawing->still, r));
     frame->lit_low_m = low - margin_m;
     frame->lit_high_m = high + margin_m;
 }
@@ -150,6 +160,9 @@ static void begin_frame(Drawing* drawing, const GuidesView* view)
     Frame* frame = &drawing->frame;
     float aspect = (float)drawing->options.width / (float)drawing->options.height, rotation[9];
     frame->camera = camera_orbit(&drawing->camera, drawing->hair.style, aspect);
+    frame->pixel_m =
+        shade_pixel_angle(&drawing->shade, &frame->camera) * vec3_length(frame->camera.eye);
+    if (shadow_resize(&drawing->shadow, frame)) drawing->lit = true;
     quat_matrix(rotation, view->pose.orientation);
     for (int i = 0; i < 9; ++i) {
         if (frame->rotation[i] != rotation[i]) drawing->moved = true;

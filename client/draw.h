@@ -25,6 +25,8 @@ typedef struct Drawing {
     Light light;
     GLuint fibres;
     Hair hair;
+    Box still;     // extent_still of it
+    float stray_m; // extent_stray of it
     uint64_t style_hash;
     int style_version;
     bool has_style;

@@ -21,6 +21,7 @@
     X(void, ClearColor, (GLfloat red, GLfloat green, GLfloat blue, GLfloat alpha)) \
     X(void, ClearDepth, (GLdouble depth)) \
     X(void, Viewport, (GLint x, GLint y, GLsizei width, GLsizei height)) \
+    X(void, Scissor, (GLint x, GLint y, GLsizei width, GLsizei height)) \
     X(void, DepthMask, (GLboolean flag)) \
     X(void, DepthFunc, (GLenum func)) \
     X(void, ColorMask, (GLboolean red, GLboolean green, GLboolean blue, GLboolean alpha)) \

@@ -4,6 +4,28 @@
 
 #include <string.h>
 
+// How much further apart vertices of the mannequin may be where pixels are so wide, by eye: noses
+// and ears keep their outline.
+static const struct {
+    float pixel_m, spacing;
+} coarser[HAIR_COARSER] = {{0.0013f, 1.5f}, {0.0040f, 3.0f}};
+
+static bool build_bodies(Hair* hair, const Gl* gl, const Hairstyle* style, Fault* fault)
+{
+    for (int i = 0; i < HAIR_COARSER; ++i)
+        if (!body_build(&hair->coarser[i], gl, style, &hair->ribbons, coarser[i].spacing, fault))
+            return false;
+    return body_build(&hair->body, gl, style, &hair->ribbons, 1.0f, fault);
+}
+
+const Body* hair_body(const Hair* hair, float pixel_m)
+{
+    for (int i = HAIR_COARSER - 1; i >= 0; --i)
+        if (pixel_m > coarser[i].pixel_m && hair->coarser[i].index_count > 0)
+            return &hair->coarser[i];
+    return &hair->body;
+}
+
 bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, Fault* fault)
 {
     memset(hair, 0, sizeof *hair);
@@ -12,7 +34,7 @@ bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, Faul
     if (!ribbons_build_lod(&hair->ribbons, style, lod, fault) ||
         !upload_create(&hair->guides, gl, style, fault) ||
         !update_create(&hair->update, gl, style, &hair->ribbons, fault) ||
-        !body_build(&hair->body, gl, style, &hair->ribbons, fault) ||
+        !build_bodies(hair, gl, style, fault) ||
         !order_create(&hair->order, gl, &hair->ribbons, style, fault)) {
         hair_free(hair, gl);
         return false;
@@ -34,6 +56,8 @@ void hair_free(Hair* hair, const Gl* gl)
     upload_free(&hair->guides, gl);
     update_free(&hair->update, gl);
     body_free(&hair->body, gl);
+    for (int i = 0; i < HAIR_COARSER; ++i)
+        body_free(&hair->coarser[i], gl);
     order_free(&hair->order, gl);
     gl->DeleteVertexArrays(1, &hair->vao);
     gl->DeleteBuffers(1, &hair->indices);

@@ -5,6 +5,8 @@
 #include "client/order.h"
 #include "client/update.h"
 
+#define HAIR_COARSER 2
+
 typedef struct Hair {
     const Hairstyle* style; // not owned
     HairMaterial material;  // the style's, or another that was asked for
@@ -12,12 +14,16 @@ typedef struct Hair {
     GuideTextures guides;
     Update update;
     Body body;
+    Body coarser[HAIR_COARSER]; // the same for small pictures of it; empty where there is none
     Order order;
     GLuint vao, indices;
 } Hair;
 
 bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, Fault* fault);
 void hair_free(Hair* hair, const Gl* gl);
+
+// The head for a picture whose pixels (or a shadow map whose texels) are `pixel_m` wide there.
+const Body* hair_body(const Hair* hair, float pixel_m);
 
 // Texture units that ribbon.glsl and fibres.glsl read.
 enum { UNIT_POSITIONS, UNIT_NORMALS, UNIT_TANGENTS, UNIT_OFFSETS, UNIT_FIBRES, UNIT_FREE };

@@ -92,8 +92,8 @@ static const struct argp_option arguments[] = {
      "shaded (default); coverage: hair as linear grey; transmittance: how much key light arrives",
      0},
     {"shadows", KEY_SHADOWS, "NAME", 0, "none, depth, opacity, layered or deep (default)", 0},
-    {"shadow-size", KEY_SHADOW_SIZE, "N", 0, "texels across a shadow map: 64 to 1024 (default 512)",
-     0},
+    {"shadow-size", KEY_SHADOW_SIZE, "N", 0,
+     "texels across a shadow map: 64 to 1024 (default 512, fewer in pictures of small heads)", 0},
     {"shadow-layers", KEY_SHADOW_LAYERS, "N", 0,
      "planes of optical depth: 4 to 128 (opacity, default 16; layered, 32), 2 to 8 (deep, 4)", 0},
     {"lod", KEY_LOD, "NAME", 0,
@@ -294,6 +294,7 @@ static error_t parse_shadow(int key, char* value, struct argp_state* state, Shad
         parse_shadow_method(state, value, shadow);
         break;
     case KEY_SHADOW_SIZE:
+        shadow->follows = false;
         shadow->size =
             (int)integer(state, "shadow-size", value, SHADOW_LEAST_SIZE, SHADOW_MOST_SIZE);
         break;

@@ -1,5 +1,6 @@
 #include "client/shade.h"
 
+#include "client/extent.h"
 #include "client/program.h"
 
 #include <stdio.h>
@@ -120,6 +121,49 @@ void shade_set_light(Shade* shade, float yaw_deg, float pitch_deg)
     place_lights(shade);
 }
 
+static void draw_background(const Shade* shade, const Gl* gl)
+{
+    Vec3 low = {0.055f, 0.06f, 0.07f}, high = {0.30f, 0.31f, 0.33f};
+    if (shade->options.has_background) low = high = shade->options.background;
+    gl->UseProgram(shade->background_program);
+    program_uniform3(gl, shade->background_program, "background_low", low);
+    program_uniform3(gl, shade->background_program, "background_high", high);
+    gl->Uniform1i(program_uniform(gl, shade->background_program, "coverage_only"),
+                  shade->options.view != VIEW_SHADED);
+    gl->Disable(GL_DEPTH_TEST);
+    gl->BindVertexArray(shade->vao);
+    gl->DrawArrays(GL_TRIANGLES, 0, 3);
+    gl->Enable(GL_DEPTH_TEST);
+}
+
+static void resolve(const Shade* shade, const Gl* gl, GLuint into)
+{
+    int width = shade->options.width, height = shade->options.height;
+    gl->BindFramebuffer(GL_READ_FRAMEBUFFER, shade->multisampled);
+    gl->BindFramebuffer(GL_DRAW_FRAMEBUFFER, shade->resolved);
+    gl->BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    gl->BindFramebuffer(GL_FRAMEBUFFER, into);
+    gl->Disable(GL_DEPTH_TEST);
+    gl->UseProgram(shade->resolve_program);
+    gl->Uniform1i(program_uniform(gl, shade->resolve_program, "coverage_only"),
+                  shade->options.view == VIEW_COVERAGE);
+    gl->Uniform1i(program_uniform(gl, shade->resolve_program, "transmittance_only"),
+                  shade->options.view == VIEW_TRANSMITTANCE);
+    gl->ActiveTexture(GL_TEXTURE0);
+    gl->BindTexture(GL_TEXTURE_2D, shade->resolved_texture);
+    gl->BindVertexArray(shade->vao);
+    gl->DrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+// The backdrop stays the same from picture to picture.
+static void keep_backdrop(const Shade* shade, const Gl* gl)
+{
+    gl->BindFramebuffer(GL_FRAMEBUFFER, shade->multisampled);
+    gl->Viewport(0, 0, shade->options.width, shade->options.height);
+    draw_background(shade, gl);
+    resolve(shade, gl, shade->backdrop);
+}
+
 bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, const Shadow* shadow,
                   Fault* fault)
 {
@@ -131,8 +175,11 @@ bool shade_create(Shade* shade, const Gl* gl, const ShadeOptions* options, const
     gl->GenVertexArrays(1, &shade->vao);
     if (create_multisampled(shade, gl, fault) && build_programs(shade, gl, shadow, fault) &&
         create_target(shade, gl, GL_RGBA16F, &shade->resolved, &shade->resolved_texture, fault) &&
-        create_target(shade, gl, GL_RGBA8, &shade->output, &shade->output_texture, fault))
+        create_target(shade, gl, GL_RGBA8, &shade->backdrop, &shade->backdrop_texture, fault) &&
+        create_target(shade, gl, GL_RGBA8, &shade->output, &shade->output_texture, fault)) {
+        keep_backdrop(shade, gl);
         return true;
+    }
     shade_free(shade, gl);
     return false;
 }
@@ -147,27 +194,19 @@ void shade_free(Shade* shade, const Gl* gl)
     gl->DeleteFramebuffers(1, &shade->multisampled);
     gl->DeleteFramebuffers(1, &shade->resolved);
     gl->DeleteFramebuffers(1, &shade->output);
+    gl->DeleteFramebuffers(1, &shade->backdrop);
     gl->DeleteRenderbuffers(1, &shade->colour);
     gl->DeleteRenderbuffers(1, &shade->depth);
     gl->DeleteTextures(1, &shade->resolved_texture);
     gl->DeleteTextures(1, &shade->output_texture);
+    gl->DeleteTextures(1, &shade->backdrop_texture);
     gl->DeleteVertexArrays(1, &shade->vao);
     memset(shade, 0, sizeof *shade);
 }
 
-static void draw_background(const Shade* shade, const Gl* gl)
+float shade_pixel_angle(const Shade* shade, const Camera* camera)
 {
-    Vec3 low = {0.055f, 0.06f, 0.07f}, high = {0.30f, 0.31f, 0.33f};
-    if (shade->options.has_background) low = high = shade->options.background;
-    gl->UseProgram(shade->background_program);
-    program_uniform3(gl, shade->background_program, "background_low", low);
-    program_uniform3(gl, shade->background_program, "background_high", high);
-    gl->Uniform1i(program_uniform(gl, shade->background_program, "coverage_only"),
-                  shade->options.view != VIEW_SHADED);
-    gl->Disable(GL_DEPTH_TEST);
-    gl->BindVertexArray(shade->vao);
-    gl->DrawArrays(GL_TRIANGLES, 0, 3);
-    gl->Enable(GL_DEPTH_TEST);
+    return 2.0f / camera->projection.m[1][1] / (float)shade->options.height;
 }
 
 // What hair.frag and body.frag share.
@@ -185,32 +224,12 @@ static void use_program(const Shade* shade, const Gl* gl, GLuint program, const 
     program_uniform3(gl, program, "eye", camera->eye);
     lights_bind(&shade->lights, gl, program);
     program_uniform3(gl, program, "root_colour", material->root_colour);
-    gl->Uniform1f(program_uniform(gl, program, "pixel_angle"),
-                  2.0f / camera->projection.m[1][1] / (float)shade->options.height);
+    gl->Uniform1f(program_uniform(gl, program, "pixel_angle"), shade_pixel_angle(shade, camera));
     gl->Uniform1i(program_uniform(gl, program, "coverage_only"),
                   shade->options.view == VIEW_COVERAGE);
     gl->Uniform1i(program_uniform(gl, program, "transmittance_only"),
                   shade->options.view == VIEW_TRANSMITTANCE);
     shadow_bind(shadow, gl, program);
-}
-
-static void resolve(const Shade* shade, const Gl* gl)
-{
-    int width = shade->options.width, height = shade->options.height;
-    gl->BindFramebuffer(GL_READ_FRAMEBUFFER, shade->multisampled);
-    gl->BindFramebuffer(GL_DRAW_FRAMEBUFFER, shade->resolved);
-    gl->BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-    gl->BindFramebuffer(GL_FRAMEBUFFER, shade->output);
-    gl->Disable(GL_DEPTH_TEST);
-    gl->UseProgram(shade->resolve_program);
-    gl->Uniform1i(program_uniform(gl, shade->resolve_program, "coverage_only"),
-                  shade->options.view == VIEW_COVERAGE);
-    gl->Uniform1i(program_uniform(gl, shade->resolve_program, "transmittance_only"),
-                  shade->options.view == VIEW_TRANSMITTANCE);
-    gl->ActiveTexture(GL_TEXTURE0);
-    gl->BindTexture(GL_TEXTURE_2D, shade->resolved_texture);
-    gl->BindVertexArray(shade->vao);
-    gl->DrawArrays(GL_TRIANGLES, 0, 3);
 }
 
 bool shade_sorts(const Shade* shade, OrderBy* by, bool* far_first)
@@ -234,9 +253,23 @@ static int draw_hair(const Shade* shade, const Gl* gl, const Hair* hair, GLuint 
     return calls;
 }
 
+// Leaves only the part of the picture to be drawn that can hold hair or head.
+static void put_backdrop(const Shade* shade, const Gl* gl, const Frame* frame)
+{
+    int width = shade->options.width, height = shade->options.height;
+    gl->BindFramebuffer(GL_READ_FRAMEBUFFER, shade->backdrop);
+    gl->BindFramebuffer(GL_DRAW_FRAMEBUFFER, shade->output);
+    gl->BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    Mat4 view_projection = matrix_mul(&frame->camera.projection, &frame->camera.view);
+    Extent seen = extent_seen(&view_projection, frame->drawn, width, height);
+    gl->Scissor(seen.x, seen.y, seen.width, seen.height);
+    gl->Enable(GL_SCISSOR_TEST);
+}
+
 int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* shadow,
               const Light* light, const Frame* frame)
 {
+    put_backdrop(shade, gl, frame);
     gl->BindFramebuffer(GL_FRAMEBUFFER, shade->multisampled);
     gl->Viewport(0, 0, shade->options.width, shade->options.height);
     if (shade->samples > 1) gl->Enable(GL_MULTISAMPLE);
@@ -246,7 +279,9 @@ int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* 
     draw_background(shade, gl);
     use_program(shade, gl, shade->body_program, shadow, hair, frame);
     shading_bind(&light->shading, gl, shade->body_program);
-    int calls = body_draw(&hair->body, gl);
+    const Body* body = hair_body(hair, frame->pixel_m);
+    gl->Uniform1i(program_uniform(gl, shade->body_program, "fine_mesh"), body->is_mannequin);
+    int calls = body_draw(body, gl);
     light_show(light, gl);
     if (shade->options.pre_z) {
         use_program(shade, gl, shade->depth_program, shadow, hair, frame);
@@ -255,7 +290,8 @@ int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* 
     use_program(shade, gl, shade->hair_program, shadow, hair, frame);
     calls += draw_hair(shade, gl, hair, shadow->fibres,
                        shade->options.pre_z ? STEP_AFTER_DEPTH : STEP_ALONE);
-    resolve(shade, gl);
+    resolve(shade, gl, shade->output);
+    gl->Disable(GL_SCISSOR_TEST);
     return calls + 2; // and background and resolve
 }
 

@@ -37,6 +37,7 @@ typedef struct Shade {
     GLuint multisampled, colour, depth; // framebuffer and renderbuffers
     GLuint resolved, resolved_texture;  // one sample a pixel, linear, RGBA16F
     GLuint output, output_texture;      // sRGB, RGBA8
+    GLuint backdrop, backdrop_texture;  // the same without hair and head
     GLuint vao;
     Lights lights;
 } Shade;
@@ -50,6 +51,9 @@ void shade_free(Shade* shade, const Gl* gl);
 
 // Whether hair must be sorted before a picture, by what, and which comes first.
 bool shade_sorts(const Shade* shade, OrderBy* by, bool* far_first);
+
+// Metres that a pixel spans at one metre.
+float shade_pixel_angle(const Shade* shade, const Camera* camera);
 
 // Draws one picture of `hair`. Returns the draw calls made.
 int shade_run(const Shade* shade, const Gl* gl, const Hair* hair, const Shadow* shadow,

@@ -1,5 +1,6 @@
 #include "client/shadow.h"
 
+#include "client/extent.h"
 #include "client/program.h"
 #include "client/shadow_map.h"
 
@@ -55,7 +56,8 @@ int shadow_find_method(const char* name)
 ShadowOptions shadow_default(void)
 {
     return (ShadowOptions){.method = shadow_find_method("deep"),
-                           .size = 512}; // 1.2 mm a texel on long hair
+                           .size = 512, // 1.2 mm a texel on long hair
+                           .follows = true};
 }
 
 static void write_defines(Shadow* shadow)
@@ -70,6 +72,7 @@ bool shadow_create(Shadow* shadow, const Gl* gl, const ShadowOptions* options, G
 {
     memset(shadow, 0, sizeof *shadow);
     shadow->options = *options;
+    shadow->size = options->size;
     shadow->method = &shadow_methods[options->method];
     shadow->tuning = options->tuning != NULL ? *options->tuning : shadow->method->tuning;
     shadow->fibres = fibres;
@@ -109,43 +112,44 @@ static void fit(ShadowMap* map, Vec3 light, Box box, float low_m, float high_m, 
     map->matrix = matrix_mul(&ortho, &view);
 }
 
-// The box round a rotated box.
-static Box rotate_box(Box box, const float r[9])
+static int draw_body(Shadow* shadow, const Gl* gl, const Hair* hair, Vec3 light, const Frame* frame)
 {
-    Vec3 middle = vec3_scale(vec3_add(box.low, box.high), 0.5f);
-    Vec3 half = vec3_scale(vec3_sub(box.high, box.low), 0.5f);
-    Vec3 m = vec3(r[0] * middle.x + r[1] * middle.y + r[2] * middle.z,
-                  r[3] * middle.x + r[4] * middle.y + r[5] * middle.z,
-                  r[6] * middle.x + r[7] * middle.y + r[8] * middle.z);
-    Vec3 h = vec3(fabsf(r[0]) * half.x + fabsf(r[1]) * half.y + fabsf(r[2]) * half.z,
-                  fabsf(r[3]) * half.x + fabsf(r[4]) * half.y + fabsf(r[5]) * half.z,
-                  fabsf(r[6]) * half.x + fabsf(r[7]) * half.y + fabsf(r[8]) * half.z);
-    return (Box){vec3_sub(m, h), vec3_add(m, h)};
-}
-
-static int draw_body(Shadow* shadow, const Gl* gl, const Body* body, Vec3 light, const Frame* frame)
-{
-    Box box = body->index_count > 0 ? rotate_box(body->box, frame->rotation) : frame->bounds;
+    const Body* body = &hair->body;
+    Box box = body->index_count > 0 ? box_rotate(body->box, frame->rotation) : frame->bounds;
     float middle = 0.5f * vec3_dot(vec3_add(box.low, box.high), light);
     float radius = 0.5f * vec3_length(vec3_sub(box.high, box.low)) + 0.005f;
-    fit(&shadow->body, light, box, middle - radius, middle + radius, shadow->options.size);
-    shadow_map_use(&shadow->body, gl, shadow->body.framebuffer, shadow->body_program,
-                   shadow->options.size, light, frame->rotation);
+    fit(&shadow->body, light, box, middle - radius, middle + radius, shadow->size);
+    shadow_map_use(&shadow->body, gl, shadow->body.framebuffer, shadow->body_program, shadow->size,
+                   light, frame->rotation);
     gl->Enable(GL_DEPTH_TEST);
     gl->DepthMask(GL_TRUE);
     gl->ClearDepth(1.0);
     gl->Clear(GL_DEPTH_BUFFER_BIT);
-    return shadow->method->draw == NULL ? 0 : body_draw(body, gl);
+    return shadow->method->draw == NULL ? 0 : body_draw(hair_body(hair, shadow->body.texel_m), gl);
+}
+
+static int size_for(const Shadow* shadow, float pixel_m)
+{
+    int size = shadow->options.size;
+    if (!shadow->options.follows) return size;
+    int times = pixel_m > 0.0040f ? 4 : pixel_m > 0.0013f ? 2 : 1;
+    return size / times > SHADOW_LEAST_SIZE ? size / times : SHADOW_LEAST_SIZE;
+}
+
+bool shadow_resize(Shadow* shadow, const Frame* frame)
+{
+    int size = size_for(shadow, frame->pixel_m), before = shadow->size;
+    shadow->size = size;
+    return size != before;
 }
 
 int shadow_run(Shadow* shadow, const Gl* gl, const Hair* hair, Vec3 light, const Frame* frame)
 {
     int calls = 0;
-    fit(&shadow->hair, light, frame->bounds, frame->lit_low_m, frame->lit_high_m,
-        shadow->options.size);
+    fit(&shadow->hair, light, frame->bounds, frame->lit_low_m, frame->lit_high_m, shadow->size);
     if (shadow->method->draw != NULL)
         calls += shadow->method->draw(shadow, gl, hair, light, frame->rotation);
-    return calls + draw_body(shadow, gl, &hair->body, light, frame);
+    return calls + draw_body(shadow, gl, hair, light, frame);
 }
 
 void shadow_samplers(const Gl* gl, GLuint program)
@@ -173,6 +177,7 @@ void shadow_bind(const Shadow* shadow, const Gl* gl, GLuint program)
                          &shadow->hair.matrix.m[0][0]);
     gl->UniformMatrix4fv(program_uniform(gl, program, "body_light_matrix"), 1, GL_FALSE,
                          &shadow->body.matrix.m[0][0]);
+    gl->Uniform1i(program_uniform(gl, program, "shadow_size"), shadow->size);
     gl->Uniform1f(program_uniform(gl, program, "hair_light_span"), shadow->hair.span_m);
     gl->Uniform1f(program_uniform(gl, program, "body_light_span"), shadow->body.span_m);
     gl->Uniform1f(program_uniform(gl, program, "hair_bias"), tuning->bias_m);

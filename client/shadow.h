@@ -31,9 +31,10 @@ typedef struct ShadowTuning {
 } ShadowTuning;
 
 typedef struct ShadowOptions {
-    int method; // row of shadow_methods
-    int size;   // texels across
-    int layers; // 0: as the row says
+    int method;   // row of shadow_methods
+    int size;     // texels across
+    bool follows; // fewer where the head is small in the picture: half, a quarter
+    int layers;   // 0: as the row says
     ShadowFormat format;
     const ShadowTuning* tuning; // NULL: the row's
 } ShadowOptions;
@@ -62,6 +63,7 @@ typedef struct Shadow {
     ShadowOptions options;
     ShadowTuning tuning;
     const ShadowMethod* method;
+    int size;             // texels across that are drawn and read, of those there are
     ShadowMap hair, body; // `hair` has a texture where the method needs first depths
     ShadowLayers layers;
     GLuint hair_program, body_program, fibres;
@@ -87,6 +89,10 @@ ShadowOptions shadow_default(void);
 bool shadow_create(Shadow* shadow, const Gl* gl, const ShadowOptions* options, GLuint fibres,
                    Fault* fault);
 void shadow_free(Shadow* shadow, const Gl* gl);
+
+// Takes as many texels as the picture can show. True where they are not as many as before: then
+// shadows must be drawn anew.
+bool shadow_resize(Shadow* shadow, const Frame* frame);
 
 // Renders what the method needs for light from direction `light` (towards it, world axes). Returns
 // the draw calls.

@@ -110,8 +110,8 @@ int shadow_layers_draw(const Shadow* shadow, const Gl* gl, const Hair* hair, Vec
     gl->Disable(GL_DEPTH_TEST);
     gl->ClearColor(0, 0, 0, 0);
     for (int pass = 0; pass < layers->passes; ++pass) {
-        shadow_map_use(&shadow->hair, gl, layers->framebuffers[pass], program, shadow->options.size,
-                       light, rotation);
+        shadow_map_use(&shadow->hair, gl, layers->framebuffers[pass], program, shadow->size, light,
+                       rotation);
         gl->Clear(GL_COLOR_BUFFER_BIT);
         gl->Uniform1f(program_uniform(gl, program, "texel_m"), shadow->hair.texel_m);
         gl->Uniform1f(program_uniform(gl, program, "layer_unit"),

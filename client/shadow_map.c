@@ -42,8 +42,7 @@ int shadow_map_draw_hair(const Shadow* shadow, const Gl* gl, const Hair* hair, V
                          const float rotation[9], float least_m)
 {
     const ShadowMap* map = &shadow->hair;
-    shadow_map_use(map, gl, map->framebuffer, shadow->hair_program, shadow->options.size, light,
-                   rotation);
+    shadow_map_use(map, gl, map->framebuffer, shadow->hair_program, shadow->size, light, rotation);
     gl->Enable(GL_DEPTH_TEST);
     gl->DepthMask(GL_TRUE);
     gl->ClearDepth(1.0);

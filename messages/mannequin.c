@@ -341,7 +341,8 @@ int mannequin_colliders(Collider* colliders, int capacity)
 // normals.
 
 #define AXIS_CAPACITY 256
-#define BLOCK         8 // nodes per side of the coarse pass
+#define BLOCK         8       // nodes per side of the coarse pass
+#define COARSEST_M    0.0135f // the bust; wider, and its lower edge is ragged
 
 typedef struct Axis {
     int count;
@@ -385,10 +386,10 @@ static float spacing_z(float s)
     return least(ears_m, spacing(s, 0.060f, 0.130f, 0.0032f, 0.0130f));
 }
 
-static void axis_fill(Axis* axis, float from, float to, float (*step)(float))
+static void axis_fill(Axis* axis, float from, float to, float (*step)(float), float times)
 {
     axis->count = 0;
-    for (float s = from; axis->count < AXIS_CAPACITY; s += step(s)) {
+    for (float s = from; axis->count < AXIS_CAPACITY; s += least(times * step(s), COARSEST_M)) {
         axis->at[axis->count++] = s;
         if (s > to) break;
     }
@@ -523,18 +524,18 @@ static int lay_triangles(const Grid* grid, const Vec3* positions, uint32_t* out)
     return count;
 }
 
-static void grid_lay_out(Grid* grid)
+static void grid_lay_out(Grid* grid, float times)
 {
     // Half a cell off zero, so that no node lies on the mirror plane.
-    axis_fill(&grid->x, 0.5f * spacing_x(0.0f), 0.215f, spacing_x);
+    axis_fill(&grid->x, 0.5f * times * spacing_x(0.0f), 0.215f, spacing_x, times);
     axis_mirror(&grid->x);
-    axis_fill(&grid->y, -0.140f, 0.336f, spacing_y);
-    axis_fill(&grid->z, -0.150f, 0.135f, spacing_z);
+    axis_fill(&grid->y, -0.140f, 0.336f, spacing_y, times);
+    axis_fill(&grid->z, -0.150f, 0.135f, spacing_z, times);
 }
 
-static bool grid_open(Grid* grid)
+static bool grid_open(Grid* grid, float times)
 {
-    grid_lay_out(grid);
+    grid_lay_out(grid, times);
     size_t nodes = node(grid, 0, 0, grid->z.count);
     grid->distance = malloc(nodes * sizeof *grid->distance);
     grid->vertex = calloc(nodes, sizeof *grid->vertex);
@@ -565,11 +566,11 @@ static bool mesh_fill(Grid* grid, HeadMesh* mesh)
     return true;
 }
 
-bool mannequin_mesh(HeadMesh* mesh, Vec3 skin_colour, Fault* fault)
+bool mannequin_mesh(HeadMesh* mesh, float spacing, Vec3 skin_colour, Fault* fault)
 {
     memset(mesh, 0, sizeof *mesh);
     Grid* grid = calloc(1, sizeof *grid);
-    bool made = grid && grid_open(grid) && mesh_fill(grid, mesh);
+    bool made = grid && grid_open(grid, spacing) && mesh_fill(grid, mesh);
     if (grid) {
         free(grid->distance);
         free(grid->vertex);

@@ -26,6 +26,7 @@ float mannequin_scalp(Vec3 surface);
 // how many (<= capacity).
 int mannequin_colliders(Collider* colliders, int capacity);
 
-// Triangulates the surface; about 19,000 vertices, close over eyes, lips and ears; positions on the
-// surface, normals its gradient.
-bool mannequin_mesh(HeadMesh* mesh, Vec3 skin_colour, Fault* fault);
+// Triangulates the surface; positions on the surface, normals its gradient. At `spacing` 1 there
+// are about 19,000 vertices, close over eyes, lips and ears; at more they lie so many times as far
+// apart, but on the bust.
+bool mannequin_mesh(HeadMesh* mesh, float spacing, Vec3 skin_colour, Fault* fault);

@@ -1,14 +1,15 @@
 // Skin and clothes: Lambert, softened at the terminator where it is skin. The scalp is shaded as hair
-// with the tangents of the hair that grows there, so that gaps between wisps show roots, not skin.
+// at its vertices (body.vert).
 #include "lights.glsl"
 #include "shading.glsl"
 #include "transmittance.glsl"
 
-in vec3 v_position, v_normal, v_tangent;
+in vec3 v_position, v_normal, v_scalp;
 in vec4 v_albedo;
+in float v_lit;
 uniform vec3 eye;
-uniform vec3 root_colour;
 uniform int coverage_only, transmittance_only;
+uniform int fine_mesh; // no shadow falls between the vertices of a triangle
 
 layout(location = 0) out vec4 out_radiance;
 
@@ -19,6 +20,14 @@ vec3 lambert(vec3 normal, vec3 light, vec3 albedo)
     return albedo * INV_PI * clamp((dot(normal, light) + wrap) / (1.0 + wrap), 0.0, 1.0);
 }
 
+// Where all vertices are in full light or in none, so is what lies between them; and most scalp is hidden. Elsewhere shadows have edges that are finer than triangles.
+float key_lit(vec3 normal)
+{
+    bool even = fine_mesh != 0 && (v_lit < 0.01 || v_lit > 0.99 || v_albedo.a > 0.5);
+    float lit = skin_lit(v_position, normal, !even);
+    return even ? v_lit : lit;
+}
+
 void main()
 {
     if (coverage_only != 0) {
@@ -26,7 +35,7 @@ void main()
         return;
     }
     vec3 normal = normalize(v_normal), view = normalize(eye - v_position);
-    float lit = skin_lit(v_position, normal);
+    float lit = key_lit(normal);
     if (transmittance_only != 0) {
         out_radiance = vec4(vec3(lit), 0.0);
         return;
@@ -37,9 +46,5 @@ void main()
                 SKY * (0.7 + 0.3 * normal.y) * v_albedo.rgb;
     vec3 half_way = normalize(view + key_direction);
     skin += 0.02 * KEY * lit * pow(max(dot(normal, half_way), 0.0), 24.0);
-    Strand strand = Strand(normalize(v_tangent + vec3(1e-6)), normal, root_colour, 0.0, 1.0);
-    vec3 scalp = KEY * lit * strand_shade(strand, key_direction, view).body +
-                 0.35 * RIM * strand_shade(strand, rim_direction, view).body +
-                 0.35 * SKY * root_colour;
-    out_radiance = vec4(mix(skin, scalp, v_albedo.a), 0.0);
+    out_radiance = vec4(mix(skin, v_scalp, v_albedo.a), 0.0);
 }

@@ -8,7 +8,7 @@ const float HAIR_THICKEST_M = 0.03;
 
 float below_first_hair(vec3 at, ivec2 shift)
 {
-    ivec2 size = textureSize(hair_depth, 0), texel = ivec2(floor(at.xy * vec2(size))) + shift;
+    ivec2 size = ivec2(shadow_size), texel = ivec2(floor(at.xy * vec2(size))) + shift;
     if (!is_in_map(texel, size)) return 1.0;
     // Not behind the far plane: there a texel without hair would be hair.
     float dz = (min(at.z, 1.0) - texelFetch(hair_depth, texel, 0).r) * hair_light_span - hair_bias;
@@ -25,12 +25,13 @@ float hair_transmittance(vec3 position)
     return sum * 0.2;
 }
 
-// On skin: sixteen texels, since whole shadows of single ribbons are seen there.
-float hair_transmittance_wide(vec3 position)
+// On skin: sixteen texels, since whole shadows of single ribbons are seen there. `taps` is 16, or 0
+// where the answer is not needed.
+float hair_transmittance_wide(vec3 position, int taps)
 {
     vec3 at = light_place(hair_light_matrix, position);
     float sum = 0.0;
-    for (int i = 0; i < 16; ++i)
+    for (int i = 0; i < taps; ++i)
         sum += below_first_hair(at, ivec2(2 * (i & 3) - 3, 2 * (i >> 2) - 3));
     return sum / 16.0;
 }

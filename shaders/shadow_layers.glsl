@@ -26,7 +26,7 @@ int plane_behind(float depth)
 
 float texel_transmittance(ivec2 texel, float z)
 {
-    if (!is_in_map(texel, textureSize(hair_layers, 0).xy)) return 1.0;
+    if (!is_in_map(texel, ivec2(shadow_size))) return 1.0;
     float depth = clamp(layer_place(z, texel), 0.0, layer_depths[LAYERS - 1]);
     int plane = plane_behind(depth);
     float before = plane > 0 ? layer_depths[plane - 1] : 0.0;
@@ -39,7 +39,7 @@ float hair_transmittance(vec3 position)
 {
     vec3 at = light_place(hair_light_matrix, position);
     float z = at.z - hair_bias / hair_light_span;
-    vec2 corner = at.xy * vec2(textureSize(hair_layers, 0).xy) - 0.5, f = fract(corner);
+    vec2 corner = at.xy * vec2(ivec2(shadow_size)) - 0.5, f = fract(corner);
     ivec2 texel = ivec2(floor(corner));
     vec2 low = vec2(texel_transmittance(texel, z), texel_transmittance(texel + ivec2(1, 0), z));
     vec2 high = vec2(texel_transmittance(texel + ivec2(0, 1), z),
@@ -48,13 +48,14 @@ float hair_transmittance(vec3 position)
     return mix(mixed.x, mixed.y, f.x);
 }
 
-// On skin: sixteen texels, since whole shadows of single ribbons are seen there.
-float hair_transmittance_wide(vec3 position)
+// On skin: sixteen texels, since whole shadows of single ribbons are seen there. `taps` is 16, or 0
+// where the answer is not needed.
+float hair_transmittance_wide(vec3 position, int taps)
 {
     vec3 at = light_place(hair_light_matrix, position);
     float z = at.z - hair_bias / hair_light_span, sum = 0.0;
-    ivec2 texel = ivec2(floor(at.xy * vec2(textureSize(hair_layers, 0).xy)));
-    for (int i = 0; i < 16; ++i)
+    ivec2 texel = ivec2(floor(at.xy * vec2(ivec2(shadow_size))));
+    for (int i = 0; i < taps; ++i)
         sum += texel_transmittance(texel + ivec2(2 * (i & 3) - 3, 2 * (i >> 2) - 3), z);
     return sum / 16.0;
 }

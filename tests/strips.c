@@ -260,7 +260,7 @@ static const char probe_text[] =
     "void main()\n"
     "{\n"
     "    vec3 at = texelFetch(places, ivec2(gl_FragCoord.xy), 0).xyz;\n"
-    "    result = vec4(hair_transmittance(at), body_light(at), 0.0, 1.0);\n"
+    "    result = vec4(hair_transmittance(at), body_light(at, 9), 0.0, 1.0);\n"
     "}\n";
 
 // With the shaders of the program, a probe of theirs.

@@ -1,5 +1,6 @@
 // Where cameras stand, and where points land in their pictures.
 #include "client/camera.h"
+#include "client/extent.h"
 #include "tests/drawing.h"
 
 // clang-format off
@@ -189,6 +190,43 @@ static void default_target_is_the_heads_centre(void** state)
     hairstyle_destroy(style);
 }
 
+// What is outside an extent is not drawn: it may not miss any point of the box.
+static void extents_hold_all_of_a_box_and_little_else(void** state)
+{
+    (void)state;
+    const Box box = {{-0.2f, -0.3f, -0.15f}, {0.25f, 0.35f, 0.2f}};
+    const int width = 640, height = 480;
+    for (int view = 0; view < 60; ++view) {
+        CameraOptions options = at(37.0f * (float)view, 80.0f * sinf((float)view));
+        options.distance_m = 0.9f + 0.1f * (float)view;
+        Camera camera = orbit(options);
+        Mat4 both = matrix_mul(&camera.projection, &camera.view);
+        Extent e = extent_seen(&both, box, width, height);
+        double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9}, size[2] = {width, height};
+        for (int i = 0; i < 1331; ++i) {
+            float u[3] = {(float)(i % 11) / 10.0f, (float)(i / 11 % 11) / 10.0f,
+                          (float)(i / 121) / 10.0f};
+            Vec3 part = {u[0] * (box.high.x - box.low.x), u[1] * (box.high.y - box.low.y),
+                         u[2] * (box.high.z - box.low.z)};
+            Vec3d seen = project(&camera, vec3_add(box.low, part));
+            double at_px[2] = {(seen.x * 0.5 + 0.5) * width, (seen.y * 0.5 + 0.5) * height};
+            for (int a = 0; a < 2; ++a) {
+                double inside = fmin(fmax(at_px[a], 0.0), size[a]);
+                low[a] = fmin(low[a], inside), high[a] = fmax(high[a], inside);
+            }
+        }
+        assert_true(e.x <= low[0] && e.x + e.width >= high[0] && e.x >= 0);
+        assert_true(e.y <= low[1] && e.y + e.height >= high[1] && e.y >= 0);
+        assert_true(e.width <= high[0] - low[0] + 8 && e.height <= high[1] - low[1] + 8);
+    }
+    CameraOptions within = at(0.0f, 0.0f);
+    within.distance_m = 0.1f; // the eye is in the box
+    Camera camera = orbit(within);
+    Mat4 both = matrix_mul(&camera.projection, &camera.view);
+    Extent all = extent_seen(&both, box, width, height);
+    assert_true(all.x == 0 && all.y == 0 && all.width == width && all.height == height);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -200,6 +238,7 @@ int main(void)
         cmocka_unit_test(field_of_view_is_vertical),
         cmocka_unit_test(default_distance_holds_the_style_at_rest),
         cmocka_unit_test(default_target_is_the_heads_centre),
+        cmocka_unit_test(extents_hold_all_of_a_box_and_little_else),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,7 +19,7 @@ static int make_mesh(void** state)
 {
     (void)state;
     Fault fault = {0};
-    return mannequin_mesh(&made, SKIN, &fault) ? 0 : -1;
+    return mannequin_mesh(&made, 1.0f, SKIN, &fault) ? 0 : -1;
 }
 
 static int free_mesh(void** state)
