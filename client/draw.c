@@ -20,8 +20,10 @@ bool draw_create(Drawing* drawing, const Gl* gl, const ShadeOptions* options,
     drawing->camera = *camera;
     drawing->times = calloc(1, sizeof *drawing->times);
     drawing->fibres = fibres_create(gl, fault);
+    ShadowOptions shadow = options->shadow;
+    shadow.evaluated = update_paths[options->update].evaluated;
     if (drawing->times != NULL && drawing->fibres != 0 &&
-        shadow_create(&drawing->shadow, gl, &options->shadow, drawing->fibres, fault) &&
+        shadow_create(&drawing->shadow, gl, &shadow, drawing->fibres, fault) &&
         light_create(&drawing->light, gl, &options->shading, &drawing->shadow, fault) &&
         shade_create(&drawing->shade, gl, options, &drawing->shadow, fault))
         return true;
@@ -48,7 +50,8 @@ bool draw_set_style(Drawing* drawing, const Hairstyle* style, uint64_t hash, int
         return true;
     Hair hair;
     Lod lod = drawing->options.lod;
-    if (!hair_create(&hair, drawing->gl, style, lod, fault)) return false; // keep the old one
+    if (!hair_create(&hair, drawing->gl, style, lod, drawing->options.update, fault))
+        return false; // keep the old one
     if (!light_fit(&drawing->light, drawing->gl, &hair.update, fault)) {
         hair_free(&hair, drawing->gl);
         return false;
@@ -212,8 +215,7 @@ bool draw_picture(Drawing* drawing, const GuidesView* view, Image* image)
     begin_frame(drawing, view);
     if (drawing->moved) {
         began = begin_pass(drawing);
-        update_run(&hair->update, gl, &hair->guides, 1.0f);
-        ++drawing->draw_calls;
+        drawing->draw_calls += update_run(&hair->update, gl, &hair->guides, view, 1.0f);
         end_pass(drawing, PASS_UPDATE, began);
     }
     if (drawing->moved || drawing->lit) run_shadow(drawing, view);

@@ -63,6 +63,12 @@
     X(void, DeleteBuffers, (GLsizei n, const GLuint* buffers)) \
     X(void, BindBuffer, (GLenum target, GLuint buffer)) \
     X(void, BufferData, (GLenum target, GLsizeiptr size, const void* data, GLenum usage)) \
+    X(void, BufferSubData, (GLenum target, GLintptr offset, GLsizeiptr size, const void* data)) \
+    X(void, GetBufferSubData, (GLenum target, GLintptr offset, GLsizeiptr size, void* data)) \
+    X(void, BindBufferBase, (GLenum target, GLuint index, GLuint buffer)) \
+    X(void, TransformFeedbackVaryings, (GLuint program, GLsizei count, const GLchar* const* varyings, GLenum mode)) \
+    X(void, BeginTransformFeedback, (GLenum mode)) \
+    X(void, EndTransformFeedback, (void)) \
     X(void, GenVertexArrays, (GLsizei n, GLuint* arrays)) \
     X(void, DeleteVertexArrays, (GLsizei n, const GLuint* arrays)) \
     X(void, BindVertexArray, (GLuint array)) \

@@ -26,14 +26,14 @@ const Body* hair_body(const Hair* hair, float pixel_m)
     return &hair->body;
 }
 
-bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, Fault* fault)
+bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, int path, Fault* fault)
 {
     memset(hair, 0, sizeof *hair);
     hair->style = style;
     hair->material = style->material;
     if (!ribbons_build_lod(&hair->ribbons, style, lod, fault) ||
         !upload_create(&hair->guides, gl, style, fault) ||
-        !update_create(&hair->update, gl, style, &hair->ribbons, fault) ||
+        !update_create(&hair->update, gl, style, &hair->ribbons, path, fault) ||
         !build_bodies(hair, gl, style, fault) ||
         !order_create(&hair->order, gl, &hair->ribbons, style, fault)) {
         hair_free(hair, gl);
@@ -64,25 +64,36 @@ void hair_free(Hair* hair, const Gl* gl)
     memset(hair, 0, sizeof *hair);
 }
 
+const char* hair_defines(bool evaluated)
+{
+    return evaluated ? "#define POINTS_EVALUATED\n" : "";
+}
+
 void hair_samplers(const Gl* gl, GLuint program)
 {
+    update_samplers(gl, program);
     program_sampler(gl, program, "drawn_positions", UNIT_POSITIONS);
     program_sampler(gl, program, "drawn_normals", UNIT_NORMALS);
     program_sampler(gl, program, "drawn_tangents", UNIT_TANGENTS);
-    program_sampler(gl, program, "table_offsets", UNIT_OFFSETS);
     program_sampler(gl, program, "fibre_ranks", UNIT_FIBRES);
+}
+
+void hair_bind_points(const Hair* hair, const Gl* gl)
+{
+    const Update* update = &hair->update;
+    for (GLenum i = 0; i < UPDATE_TARGETS; ++i) {
+        gl->ActiveTexture(GL_TEXTURE0 + UNIT_POSITIONS + i);
+        gl->BindTexture(GL_TEXTURE_2D, update->targets[i]);
+    }
+    update_bind(update, gl);
 }
 
 static int draw(const Hair* hair, const Gl* gl, GLuint fibres, GLuint vao, int index_count)
 {
     if (index_count == 0) return 0;
-    const GLuint textures[UNIT_FREE] = {
-        hair->update.targets[UPDATE_POSITIONS], hair->update.targets[UPDATE_NORMALS],
-        hair->update.targets[UPDATE_TANGENTS], hair->update.tables[TABLE_OFFSETS], fibres};
-    for (GLenum unit = 0; unit < UNIT_FREE; ++unit) {
-        gl->ActiveTexture(GL_TEXTURE0 + unit);
-        gl->BindTexture(unit == UNIT_FIBRES ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D, textures[unit]);
-    }
+    hair_bind_points(hair, gl);
+    gl->ActiveTexture(GL_TEXTURE0 + UNIT_FIBRES);
+    gl->BindTexture(GL_TEXTURE_2D_ARRAY, fibres);
     gl->ActiveTexture(GL_TEXTURE0);
     gl->Enable(GL_PRIMITIVE_RESTART);
     gl->PrimitiveRestartIndex(RIBBONS_RESTART);

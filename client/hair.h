@@ -19,17 +19,22 @@ typedef struct Hair {
     GLuint vao, indices;
 } Hair;
 
-bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, Fault* fault);
+// `path` is a row of update_paths.
+bool hair_create(Hair* hair, const Gl* gl, const Hairstyle* style, Lod lod, int path, Fault* fault);
 void hair_free(Hair* hair, const Gl* gl);
 
 // The head for a picture whose pixels (or a shadow map whose texels) are `pixel_m` wide there.
 const Body* hair_body(const Hair* hair, float pixel_m);
 
-// Texture units that ribbon.glsl and fibres.glsl read.
-enum { UNIT_POSITIONS, UNIT_NORMALS, UNIT_TANGENTS, UNIT_OFFSETS, UNIT_FIBRES, UNIT_FREE };
+// Texture units that points.glsl and fibres.glsl read, besides those of update.h.
+enum { UNIT_POSITIONS, UNIT_NORMALS, UNIT_TANGENTS, UNIT_FIBRES, UNIT_FREE };
 
+// For programs that draw ribbons: how they find points. "" or a line.
+const char* hair_defines(bool evaluated);
 // Points a program's ribbon samplers at those units; once after building it.
 void hair_samplers(const Gl* gl, GLuint program);
+// Binds what says where ribbon points are, for a program that has those samplers.
+void hair_bind_points(const Hair* hair, const Gl* gl);
 // Binds the style's tables and draws all ribbons with the program in use. Returns the draw calls:
 // 1, or 0 where there is nothing to draw.
 int hair_draw(const Hair* hair, const Gl* gl, GLuint fibres);

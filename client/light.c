@@ -112,11 +112,7 @@ void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shado
     lights_bind(lights, gl, light->program);
     shadow_bind(shadow, gl, light->program);
     shading_bind(&light->shading, gl, light->program);
-    for (GLenum i = 0; i < UPDATE_TARGETS; ++i) {
-        gl->ActiveTexture(GL_TEXTURE0 + UNIT_POSITIONS + i);
-        gl->BindTexture(GL_TEXTURE_2D, hair->update.targets[i]);
-    }
-    gl->ActiveTexture(GL_TEXTURE0);
+    hair_bind_points(hair, gl);
     gl->BindVertexArray(light->vao);
     gl->DrawArrays(GL_TRIANGLES, 0, 3);
 }

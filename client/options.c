@@ -37,6 +37,7 @@ enum {
     KEY_SHADOW_SIZE,
     KEY_SHADOW_LAYERS,
     KEY_LOD,
+    KEY_UPDATE,
     KEY_TICK,
     KEY_TICKS,
     KEY_EPOCH,
@@ -98,6 +99,9 @@ static const struct argp_option arguments[] = {
      "planes of optical depth: 4 to 128 (opacity, default 16; layered, 32), 2 to 8 (deep, 4)", 0},
     {"lod", KEY_LOD, "NAME", 0,
      "full (default), or close, medium, far: 7,800, 2,000 or 1,250 triangles of hair", 0},
+    {"update", KEY_UPDATE, "NAME", 0,
+     "where ribbon points are found: pass (default), buffer, vertex, cpu, linear; for comparison",
+     0},
     {0, 0, 0, 0, "Which ticks", 3},
     {"tick", KEY_TICK, "N", 0, "draw exactly tick N (log, embedded)", 0},
     {"ticks", KEY_TICKS, "A:B[:STEP]", 0,
@@ -287,6 +291,14 @@ static void parse_shadow_method(struct argp_state* state, const char* value, Sha
     shadow->method = choice(state, "shadows", value, names);
 }
 
+static void parse_update(struct argp_state* state, const char* value, int* path)
+{
+    const char* names[16] = {NULL};
+    for (int i = 0; update_paths[i].name != NULL && i < 15; ++i)
+        names[i] = update_paths[i].name;
+    *path = choice(state, "update", value, names);
+}
+
 static error_t parse_shadow(int key, char* value, struct argp_state* state, ShadowOptions* shadow)
 {
     switch (key) {
@@ -384,6 +396,9 @@ static error_t parse_picture(int key, char* value, struct argp_state* state, Opt
         break;
     case KEY_LOD:
         shade->lod = (Lod)choice(state, "lod", value, lod_names);
+        break;
+    case KEY_UPDATE:
+        parse_update(state, value, &shade->update);
         break;
     default:
         return parse_shadow(key, value, state, &shade->shadow);

@@ -225,21 +225,31 @@ static GLuint build_shader(const Gl* gl, GLenum type, const ShaderSource* source
     return shader;
 }
 
-static GLuint link_program(const Gl* gl, GLuint vertex, GLuint fragment, Fault* fault)
+static bool link_program(const Gl* gl, GLuint program, Fault* fault)
 {
-    const GLuint program = gl->CreateProgram();
-    gl->AttachShader(program, vertex);
-    gl->AttachShader(program, fragment);
     gl->LinkProgram(program);
-    gl->DetachShader(program, vertex);
-    gl->DetachShader(program, fragment);
     GLint linked = 0;
     gl->GetProgramiv(program, GL_LINK_STATUS, &linked);
-    if (linked) return program;
+    if (linked) return true;
     char log[LOG_BYTES] = "";
     gl->GetProgramInfoLog(program, sizeof log, NULL, log);
     const char* words = first_error(log);
-    fault_set(fault, "%.*s", (int)strcspn(words, "\n"), words);
+    return fault_set(fault, "%.*s", (int)strcspn(words, "\n"), words);
+}
+
+// `fragment` may be 0.
+static GLuint create_program(const Gl* gl, GLuint vertex, GLuint fragment,
+                             const char* const* captured, int captured_count, Fault* fault)
+{
+    GLuint program = gl->CreateProgram();
+    gl->AttachShader(program, vertex);
+    if (fragment) gl->AttachShader(program, fragment);
+    if (captured_count > 0)
+        gl->TransformFeedbackVaryings(program, captured_count, captured, GL_SEPARATE_ATTRIBS);
+    const bool linked = link_program(gl, program, fault);
+    gl->DetachShader(program, vertex);
+    if (fragment) gl->DetachShader(program, fragment);
+    if (linked) return program;
     gl->DeleteProgram(program);
     return 0;
 }
@@ -253,7 +263,7 @@ GLuint program_build_from(const Gl* gl, const ShaderSource* sources, const char*
     const GLuint fragment =
         build_shader(gl, GL_FRAGMENT_SHADER, sources, fragment_name, defines, fault);
     if (fragment) {
-        program = link_program(gl, vertex, fragment, fault);
+        program = create_program(gl, vertex, fragment, NULL, 0, fault);
         if (!program) {
             char names[128];
             snprintf(names, sizeof names, "%s + %s", vertex_name, fragment_name);
@@ -269,6 +279,18 @@ GLuint program_build(const Gl* gl, const char* vertex_name, const char* fragment
                      const char* defines, Fault* fault)
 {
     return program_build_from(gl, shader_sources, vertex_name, fragment_name, defines, fault);
+}
+
+GLuint program_build_feedback(const Gl* gl, const char* vertex_name, const char* const* captured,
+                              int captured_count, const char* defines, Fault* fault)
+{
+    const GLuint vertex =
+        build_shader(gl, GL_VERTEX_SHADER, shader_sources, vertex_name, defines, fault);
+    if (!vertex) return 0;
+    const GLuint program = create_program(gl, vertex, 0, captured, captured_count, fault);
+    if (!program) fault_prefix(fault, vertex_name);
+    gl->DeleteShader(vertex);
+    return program;
 }
 
 GLint program_uniform(const Gl* gl, GLuint program, const char* name)

@@ -25,6 +25,10 @@ GLuint program_build(const Gl* gl, const char* vertex_name, const char* fragment
 GLuint program_build_from(const Gl* gl, const ShaderSource* sources, const char* vertex_name,
                           const char* fragment_name, const char* defines, Fault* fault);
 
+// A vertex shader alone, whose outputs `captured` transform feedback writes, a buffer each.
+GLuint program_build_feedback(const Gl* gl, const char* vertex_name, const char* const* captured,
+                              int captured_count, const char* defines, Fault* fault);
+
 // Where a uniform lives; -1 (which glUniform* ignores) where the compiler dropped it.
 GLint program_uniform(const Gl* gl, GLuint program, const char* name);
 

@@ -71,8 +71,9 @@ static bool create_target(const Shade* shade, const Gl* gl, GLint format, GLuint
 
 static GLuint build_hair(const Shade* shade, const Gl* gl, TransparencyStep step, Fault* fault)
 {
-    char defines[TRANSPARENCY_DEFINES];
+    char defines[TRANSPARENCY_DEFINES + 64];
     transparency_defines(defines, shade->transparency, shade->samples, step);
+    strcat(defines, hair_defines(update_paths[shade->options.update].evaluated));
     GLuint program = program_build(gl, "hair.vert", "hair.frag", defines, fault);
     if (program == 0) return 0;
     hair_samplers(gl, program);

@@ -22,6 +22,7 @@ typedef struct ShadeOptions {
     int colour;      // shading_colour
     ShadowOptions shadow;
     Lod lod;
+    int update; // row of update_paths
     bool has_background;
     Vec3 background;                      // linear; without it a soft grey backdrop
     float light_yaw_deg, light_pitch_deg; // of the key light; fill and rim keep their places to it

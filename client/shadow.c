@@ -62,9 +62,10 @@ ShadowOptions shadow_default(void)
 
 static void write_defines(Shadow* shadow)
 {
-    snprintf(shadow->defines, SHADOW_DEFINES_BYTES, "#define SHADOWS %s\n#define LAYERS %d\n%s",
+    snprintf(shadow->defines, SHADOW_DEFINES_BYTES, "#define SHADOWS %s\n#define LAYERS %d\n%s%s",
              shadow->method->look_up, shadow->options.layers,
-             shadow->method->create == shadow_deep_create ? "#define DEEP\n" : "");
+             shadow->method->create == shadow_deep_create ? "#define DEEP\n" : "",
+             hair_defines(shadow->options.evaluated));
 }
 
 bool shadow_create(Shadow* shadow, const Gl* gl, const ShadowOptions* options, GLuint fibres,

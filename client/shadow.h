@@ -37,6 +37,7 @@ typedef struct ShadowOptions {
     int layers;   // 0: as the row says
     ShadowFormat format;
     const ShadowTuning* tuning; // NULL: the row's
+    bool evaluated;             // of update_paths: programs find ribbon points themselves
 } ShadowOptions;
 
 // Texture units, with those of hair.h.

@@ -6,7 +6,8 @@
 bool shadow_deep_create(Shadow* shadow, const Gl* gl, Fault* fault)
 {
     // Every strand counts here, also where it covers little: no alpha test.
-    shadow->hair_program = program_build(gl, "hair_depth.vert", "body_depth.frag", NULL, fault);
+    shadow->hair_program = program_build(gl, "hair_depth.vert", "body_depth.frag",
+                                         hair_defines(shadow->options.evaluated), fault);
     if (shadow->hair_program == 0) return false;
     hair_samplers(gl, shadow->hair_program);
     if (!shadow_map_create(&shadow->hair, gl, shadow->options.size, fault) ||

@@ -4,7 +4,8 @@
 
 bool shadow_depth_create(Shadow* shadow, const Gl* gl, Fault* fault)
 {
-    shadow->hair_program = program_build(gl, "hair_depth.vert", "hair_depth.frag", NULL, fault);
+    shadow->hair_program = program_build(gl, "hair_depth.vert", "hair_depth.frag",
+                                         hair_defines(shadow->options.evaluated), fault);
     if (shadow->hair_program == 0) return false;
     hair_samplers(gl, shadow->hair_program);
     return shadow_map_create(&shadow->hair, gl, shadow->options.size, fault);

@@ -86,7 +86,8 @@ bool shadow_layers_create(Shadow* shadow, const Gl* gl, const char* defines, Fau
         layers->depths[k] = k < n ? (float)plane_depth(&shadow->tuning, k, n - has_rest) : -1.0f;
     if (has_rest) layers->depths[n - 1] = 2.0f;
     char all[128];
-    snprintf(all, sizeof all, "#define TARGETS %d\n%s", layers->targets, defines ? defines : "");
+    snprintf(all, sizeof all, "#define TARGETS %d\n%s%s", layers->targets, defines ? defines : "",
+             hair_defines(shadow->options.evaluated));
     layers->program = program_build(gl, "hair_depth.vert", "hair_layers.frag", all, fault);
     if (layers->program == 0) return false;
     hair_samplers(gl, layers->program);

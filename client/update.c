@@ -5,6 +5,38 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define BLOCK_BINDING 0
+
+const UpdatePath update_paths[] = {
+    {.name = "pass",
+     .help = "a fragment a point, into textures",
+     .create = update_pass_create,
+     .run = update_pass_run},
+    {.name = "buffer",
+     .help = "a vertex a point, fed back into buffers and copied to textures",
+     .create = update_buffer_create,
+     .run = update_buffer_run},
+    {.name = "vertex", .help = "wherever a point is asked for, nothing kept", .evaluated = true},
+    {.name = "cpu",
+     .help = "on the CPU, uploaded to textures",
+     .create = update_cpu_create,
+     .run = update_cpu_run},
+    // The thesis, 5.5: straight between nodes, and as exact as the texture unit's weights.
+    {.name = "linear",
+     .help = "as pass, but guides straight between nodes, by the texture unit's filter",
+     .create = update_linear_create,
+     .run = update_pass_run},
+    {0}};
+
+const char* const update_captured[UPDATE_TARGETS] = {"out_position", "out_normal", "out_tangent"};
+
+int update_find_path(const char* name)
+{
+    for (int i = 0; update_paths[i].name != NULL; ++i)
+        if (strcmp(update_paths[i].name, name) == 0) return i;
+    return -1;
+}
+
 static GLuint float_texture(const Gl* gl, int width, int height)
 {
     GLuint texture = 0;
@@ -16,17 +48,15 @@ static GLuint float_texture(const Gl* gl, int width, int height)
     return texture;
 }
 
-// `count` texels into a table: whole rows, then what is left of the last.
-static GLuint table(const Gl* gl, Texel* texels, int count, int rows)
+// Whole rows, then what is left of the last.
+void update_put_texels(const Gl* gl, GLuint texture, int count, const void* texels)
 {
-    GLuint texture = float_texture(gl, UPDATE_WIDTH, rows);
     int full = count / UPDATE_WIDTH, rest = count % UPDATE_WIDTH;
+    const char* left = (const char*)texels + (size_t)full * UPDATE_WIDTH * sizeof(Texel);
+    gl->BindTexture(GL_TEXTURE_2D, texture);
     if (full > 0)
         gl->TexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, UPDATE_WIDTH, full, GL_RGBA, GL_FLOAT, texels);
-    if (rest > 0)
-        gl->TexSubImage2D(GL_TEXTURE_2D, 0, 0, full, rest, 1, GL_RGBA, GL_FLOAT,
-                          texels[full * UPDATE_WIDTH]);
-    return texture;
+    if (rest > 0) gl->TexSubImage2D(GL_TEXTURE_2D, 0, 0, full, rest, 1, GL_RGBA, GL_FLOAT, left);
 }
 
 static bool upload_rest(Update* update, const Gl* gl, const Hairstyle* style, Fault* fault)
@@ -40,59 +70,36 @@ static bool upload_rest(Update* update, const Gl* gl, const Hairstyle* style, Fa
     return true;
 }
 
-static void put_colliders(const Gl* gl, GLuint program, const Ribbons* ribbons)
+static void fill_constants(PointsBlock* block, const Hairstyle* style, const Ribbons* ribbons)
 {
-    float from[HAIRSTYLE_MAX_COLLIDERS][4], to[HAIRSTYLE_MAX_COLLIDERS][4];
+    Vec3 low = style->box.low, size = vec3_sub(style->box.high, style->box.low);
+    memcpy(block->box_low, (const float[4]){low.x, low.y, low.z, 1}, 16);
+    memcpy(block->box_size, (const float[4]){size.x, size.y, size.z, 0}, 16);
+    block->capsules[0] = ribbons->collider_count;
     for (int i = 0; i < ribbons->collider_count; ++i) {
         const Collider* c = &ribbons->colliders[i];
-        memcpy(from[i], (const float[4]){c->from.x, c->from.y, c->from.z, c->radius}, 16);
-        memcpy(to[i], (const float[4]){c->to.x, c->to.y, c->to.z, 0}, 16);
+        const float from[4] = {c->from.x, c->from.y, c->from.z, c->radius};
+        const float to[4] = {c->to.x, c->to.y, c->to.z, 0};
+        memcpy(block->capsule_from[i], from, sizeof from);
+        memcpy(block->capsule_to[i], to, sizeof to);
     }
-    gl->Uniform1i(program_uniform(gl, program, "capsules"), ribbons->collider_count);
-    if (ribbons->collider_count == 0) return;
-    gl->Uniform4fv(program_uniform(gl, program, "capsule_from"), ribbons->collider_count, from[0]);
-    gl->Uniform4fv(program_uniform(gl, program, "capsule_to"), ribbons->collider_count, to[0]);
 }
 
-static bool build_program(Update* update, const Gl* gl, const Hairstyle* style,
-                          const Ribbons* ribbons, Fault* fault)
+static void create_block(Update* update, const Gl* gl)
 {
-    update->program = program_build(gl, "fullscreen.vert", "update.frag", NULL, fault);
-    if (update->program == 0) return false;
-    static const char* const samplers[] = {"guide_positions", "guide_tangents", "rest_tangents",
-                                           "table_guides",    "table_weights",  "table_offsets",
-                                           "table_tangents",  "table_normals"};
-    for (int i = 0; i < 8; ++i)
-        program_sampler(gl, update->program, samplers[i], i);
-    gl->UseProgram(update->program);
-    program_uniform3(gl, update->program, "box_low", style->box.low);
-    program_uniform3(gl, update->program, "box_size", vec3_sub(style->box.high, style->box.low));
-    put_colliders(gl, update->program, ribbons);
-    update->blend = program_uniform(gl, update->program, "blend");
-    update->newest = program_uniform(gl, update->program, "newest");
-    return true;
-}
-
-static bool build_targets(Update* update, const Gl* gl, Fault* fault)
-{
-    static const GLenum buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
-                                     GL_COLOR_ATTACHMENT2};
-    gl->GenFramebuffers(1, &update->framebuffer);
-    gl->BindFramebuffer(GL_FRAMEBUFFER, update->framebuffer);
-    for (int i = 0; i < UPDATE_TARGETS; ++i) {
-        update->targets[i] = float_texture(gl, UPDATE_WIDTH, update->rows);
-        gl->FramebufferTexture2D(GL_FRAMEBUFFER, buffers[i], GL_TEXTURE_2D, update->targets[i], 0);
-    }
-    gl->DrawBuffers(UPDATE_TARGETS, buffers);
-    if (gl->CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return true;
-    return fault_set(fault, "the driver refuses three RGBA32F targets of %dx%d", UPDATE_WIDTH,
-                     update->rows);
+    gl->GenBuffers(1, &update->block);
+    gl->BindBuffer(GL_UNIFORM_BUFFER, update->block);
+    gl->BufferData(GL_UNIFORM_BUFFER, sizeof update->constants, &update->constants,
+                   GL_DYNAMIC_DRAW);
+    gl->BindBuffer(GL_UNIFORM_BUFFER, 0);
 }
 
 bool update_create(Update* update, const Gl* gl, const Hairstyle* style, const Ribbons* ribbons,
-                   Fault* fault)
+                   int path, Fault* fault)
 {
     memset(update, 0, sizeof *update);
+    update->path = &update_paths[path];
+    update->ribbons = *ribbons;
     update->point_count = ribbons->point_count;
     update->rows = (ribbons->point_count + UPDATE_WIDTH - 1) / UPDATE_WIDTH;
     if (update->rows < 1) update->rows = 1;
@@ -101,11 +108,17 @@ bool update_create(Update* update, const Gl* gl, const Hairstyle* style, const R
                          ribbons->point_count, update->rows, gl->max_texture_size);
     Texel* const texels[UPDATE_TABLES] = {ribbons->guides, ribbons->weights, ribbons->offsets,
                                           ribbons->tangents, ribbons->normals};
-    for (int i = 0; i < UPDATE_TABLES; ++i)
-        update->tables[i] = table(gl, texels[i], ribbons->point_count, update->rows);
+    for (int i = 0; i < UPDATE_TABLES; ++i) {
+        update->tables[i] = float_texture(gl, UPDATE_WIDTH, update->rows);
+        update_put_texels(gl, update->tables[i], ribbons->point_count, texels[i]);
+    }
+    for (int i = 0; i < UPDATE_TARGETS && !update->path->evaluated; ++i)
+        update->targets[i] = float_texture(gl, UPDATE_WIDTH, update->rows);
     gl->GenVertexArrays(1, &update->vao);
-    if (upload_rest(update, gl, style, fault) && build_program(update, gl, style, ribbons, fault) &&
-        build_targets(update, gl, fault))
+    fill_constants(&update->constants, style, ribbons);
+    create_block(update, gl);
+    if (upload_rest(update, gl, style, fault) &&
+        (update->path->create == NULL || update->path->create(update, gl, style, fault)))
         return true;
     update_free(update, gl);
     return false;
@@ -116,32 +129,54 @@ void update_free(Update* update, const Gl* gl)
     gl->DeleteProgram(update->program);
     gl->DeleteFramebuffers(1, &update->framebuffer);
     gl->DeleteVertexArrays(1, &update->vao);
+    gl->DeleteBuffers(1, &update->block);
+    gl->DeleteBuffers(UPDATE_TARGETS, update->feedback);
     gl->DeleteTextures(UPDATE_TARGETS, update->targets);
     gl->DeleteTextures(UPDATE_TABLES, update->tables);
     gl->DeleteTextures(1, &update->rest_tangents);
+    update_cpu_free(update);
     memset(update, 0, sizeof *update);
+}
+
+void update_samplers(const Gl* gl, GLuint program)
+{
+    static const char* const samplers[UPDATE_UNITS] = {
+        "guide_positions", "guide_tangents", "rest_tangents",  "table_guides",
+        "table_weights",   "table_offsets",  "table_tangents", "table_normals"};
+    for (int i = 0; i < UPDATE_UNITS; ++i)
+        program_sampler(gl, program, samplers[i], UPDATE_UNIT + i);
+    program_block(gl, program, "PointsBlock", BLOCK_BINDING);
 }
 
 static void bind(const Gl* gl, GLenum unit, GLenum target, GLuint texture)
 {
-    gl->ActiveTexture(GL_TEXTURE0 + unit);
+    gl->ActiveTexture(GL_TEXTURE0 + UPDATE_UNIT + unit);
     gl->BindTexture(target, texture);
 }
 
-void update_run(const Update* update, const Gl* gl, const GuideTextures* textures, float blend)
+void update_bind(const Update* update, const Gl* gl)
 {
-    gl->BindFramebuffer(GL_FRAMEBUFFER, update->framebuffer);
-    gl->Viewport(0, 0, UPDATE_WIDTH, update->rows);
-    gl->Disable(GL_DEPTH_TEST);
-    gl->UseProgram(update->program);
-    gl->Uniform1f(update->blend, blend);
-    gl->Uniform1uiv(update->newest, HAIRSTYLE_MAX_GUIDES / 32, textures->newest);
-    bind(gl, 0, GL_TEXTURE_2D_ARRAY, textures->positions);
-    bind(gl, 1, GL_TEXTURE_2D_ARRAY, textures->tangents);
+    bind(gl, 0, GL_TEXTURE_2D_ARRAY, update->guide_positions);
+    bind(gl, 1, GL_TEXTURE_2D_ARRAY, update->guide_tangents);
     bind(gl, 2, GL_TEXTURE_2D, update->rest_tangents);
     for (GLenum i = 0; i < UPDATE_TABLES; ++i)
         bind(gl, 3 + i, GL_TEXTURE_2D, update->tables[i]);
-    gl->BindVertexArray(update->vao);
-    gl->DrawArrays(GL_TRIANGLES, 0, 3);
     gl->ActiveTexture(GL_TEXTURE0);
+    gl->BindBufferBase(GL_UNIFORM_BUFFER, BLOCK_BINDING, update->block);
+}
+
+int update_run(Update* update, const Gl* gl, const GuideTextures* textures, const GuidesView* view,
+               float blend)
+{
+    PointsBlock* constants = &update->constants;
+    update->guide_positions = textures->positions;
+    update->guide_tangents = textures->tangents;
+    constants->box_low[3] = blend;
+    memcpy(constants->newest, textures->newest, sizeof constants->newest);
+    gl->BindBuffer(GL_UNIFORM_BUFFER, update->block);
+    gl->BufferSubData(GL_UNIFORM_BUFFER, 0, sizeof *constants, constants);
+    gl->BindBuffer(GL_UNIFORM_BUFFER, 0);
+    if (update->path->run == NULL) return 0;
+    update_bind(update, gl);
+    return update->path->run(update, gl, &(UpdateGuides){textures, view, blend});
 }

@@ -12,8 +12,9 @@ static GLuint create_texture(const Gl* gl, GLint format, int guides, int nodes)
     gl->BindTexture(GL_TEXTURE_2D_ARRAY, texture);
     GLenum type = format == GL_RGBA16 ? GL_UNSIGNED_SHORT : GL_SHORT;
     gl->TexImage3D(GL_TEXTURE_2D_ARRAY, 0, format, nodes, guides, 2, 0, GL_RGB, type, NULL);
-    gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    // For the path `linear` alone; all others fetch texels, which no filter touches.
+    gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    gl->TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     return texture;
 }
 

@@ -1,8 +1,8 @@
 // Light pass: radiance of every ribbon point towards the eye (client/light.h says why points).
 #include "lights.glsl"
+#include "points.glsl"
 #include "shading.glsl"
 #include "transmittance.glsl"
-uniform sampler2D drawn_positions, drawn_normals, drawn_tangents;
 uniform mat3 head_rotation;
 uniform vec3 eye; // relative to the head's position, world axes
 uniform vec3 root_colour, tip_colour;
@@ -13,13 +13,11 @@ layout(location = 1) out vec4 out_shine; // first highlight
 
 void main()
 {
-    ivec2 at = ivec2(gl_FragCoord.xy);
-    vec3 position = head_rotation * texelFetch(drawn_positions, at, 0).xyz;
-    vec3 normal = head_rotation * texelFetch(drawn_normals, at, 0).xyz;
-    vec4 tangent = texelFetch(drawn_tangents, at, 0);
-    float along = tangent.w;
+    Point point = point_at(ivec2(gl_FragCoord.xy));
+    vec3 position = head_rotation * point.position, normal = head_rotation * point.normal;
+    float along = point.along;
     vec3 view = normalize(eye - position);
-    Strand strand = Strand(normalize(head_rotation * tangent.xyz), normalize(normal),
+    Strand strand = Strand(normalize(head_rotation * point.tangent), normalize(normal),
                            mix(root_colour, tip_colour, along), along, 1.0);
     Lobes sum = scaled(strand_shade(strand, key_direction, view), KEY * hair_lit(position));
     // Deeper hair sees less of what casts no shadow here.

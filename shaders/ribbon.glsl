@@ -1,8 +1,5 @@
 // A vertex of a ribbon: one edge of one point, widened across what looks at it.
-uniform sampler2D drawn_positions; // head space m; half width
-uniform sampler2D drawn_normals;   // head space; random
-uniform sampler2D drawn_tangents;  // head space; along
-uniform sampler2D table_offsets;   // w: fill
+#include "points.glsl"
 uniform mat3 head_rotation;
 
 struct Ribbon {
@@ -27,24 +24,22 @@ vec3 facing(vec3 towards, vec3 normal, float half_width)
 Ribbon ribbon_vertex(int vertex, vec4 eye, float pixel)
 {
     int i = vertex >> 1;
-    int width = textureSize(drawn_positions, 0).x;
+    int width = textureSize(table_offsets, 0).x;
     ivec2 at = ivec2(i % width, i / width);
-    vec4 p = texelFetch(drawn_positions, at, 0);
-    vec4 n = texelFetch(drawn_normals, at, 0);
-    vec4 t = texelFetch(drawn_tangents, at, 0);
+    Point p = point_at(at);
     Ribbon r;
-    r.position = head_rotation * p.xyz;
-    r.tangent = head_rotation * t.xyz;
+    r.position = head_rotation * p.position;
+    r.tangent = head_rotation * p.tangent;
     r.texel = at;
-    r.along = t.w;
-    r.random = n.w;
+    r.along = p.along;
+    r.random = p.random;
     float edge = float(vertex & 1) * 2.0 - 1.0;
-    r.across = edge * p.w;
+    r.across = edge * p.half_width;
     vec3 towards = eye.xyz - eye.w * r.position;
     float least = 0.5 * pixel * (eye.w > 0.0 ? length(towards) : 1.0);
-    float half_width = max(p.w, least);
-    r.fill = texelFetch(table_offsets, at, 0).w * p.w / half_width;
-    vec3 side = cross(r.tangent, facing(towards, head_rotation * n.xyz, p.w));
+    float half_width = max(p.half_width, least);
+    r.fill = p.fill * p.half_width / half_width;
+    vec3 side = cross(r.tangent, facing(towards, head_rotation * p.normal, p.half_width));
     float length2 = dot(side, side);
     r.position += side * (length2 > 1e-20 ? inversesqrt(length2) : 0.0) * edge * half_width;
     return r;

@@ -155,13 +155,13 @@ static bool open_scene(Scene* scene, const Gl* gl, Fault* fault)
     scene->fibres = fibres_create(gl, fault);
     GuidesView view;
     ShadowOptions shadow = shadow_default();
-    if (scene->fibres == 0 || !hair_create(&scene->hair, gl, scene->style, LOD_FULL, fault) ||
+    if (scene->fibres == 0 || !hair_create(&scene->hair, gl, scene->style, LOD_FULL, 0, fault) ||
         !shadow_create(&scene->shadow, gl, &shadow, scene->fibres, fault) ||
         !guides_view_init(&view, 0, fault))
         return false;
     upload_rows(&scene->hair.guides, gl, &view); // nothing has come: hair at rest
+    update_run(&scene->hair.update, gl, &scene->hair.guides, &view, 1.0f);
     guides_view_free(&view);
-    update_run(&scene->hair.update, gl, &scene->hair.guides, 1.0f);
     CameraOptions camera = camera_default();
     scene->lights = (Lights){camera_direction(40, 45),
                              camera_direction(-60, 10),

@@ -190,10 +190,10 @@ static void draw_numbers(const Gl* gl, const Hairstyle* style, const Ribbons* ri
     Update update;
     GuidesView view = drawing_view(style);
     assert_true(upload_create(&guides, gl, style, &fault));
-    assert_true(update_create(&update, gl, style, ribbons, &fault));
+    assert_true(update_create(&update, gl, style, ribbons, 0, &fault));
     drawing_put_tick(&view, style, 1, 5, 0.9f);
     upload_rows(&guides, gl, &view);
-    update_run(&update, gl, &guides, 1.0f);
+    update_run(&update, gl, &guides, &view, 1.0f);
     Texel* out = test_malloc((size_t)update.rows * UPDATE_WIDTH * sizeof *out);
     for (int target = 0; target < UPDATE_TARGETS; ++target) {
         gl->BindTexture(GL_TEXTURE_2D, update.targets[target]);

@@ -42,7 +42,7 @@ static bool bench_open(Bench* bench, const char* backend, Hairstyle* style)
     bench->style = style;
     assert_true(ribbons_build(&bench->ribbons, style, &fault));
     assert_true(upload_create(&bench->guides, bench->gl, style, &fault));
-    if (!update_create(&bench->update, bench->gl, style, &bench->ribbons, &fault))
+    if (!update_create(&bench->update, bench->gl, style, &bench->ribbons, 0, &fault))
         fail_msg("%s", fault.text);
     bench->view = drawing_view(style);
     size_t texels = (size_t)bench->update.rows * UPDATE_WIDTH;
@@ -72,7 +72,7 @@ static void bench_run(Bench* bench, float blend)
     const Gl* gl = bench->gl;
     Fault fault = {""};
     upload_rows(&bench->guides, gl, &bench->view);
-    update_run(&bench->update, gl, &bench->guides, blend);
+    update_run(&bench->update, gl, &bench->guides, &bench->view, blend);
     for (int i = 0; i < UPDATE_TARGETS; ++i) {
         gl->BindTexture(GL_TEXTURE_2D, bench->update.targets[i]);
         gl->GetTexImage(GL_TEXTURE_2D, 0, GL_RGBA, GL_FLOAT, bench->out[i]);
