@@ -25,7 +25,7 @@ typedef struct Frame {
     Camera camera;
     float rotation[9];           // of the head, row-major
     Box bounds;                  // what hair fills now
-    float lit_low_m, lit_high_m; // ... and from where to where along the key light
+    float lit_low_m, lit_high_m; // ... and from where to where along a light
 } Frame;
 
 CameraOptions camera_default(void);

@@ -58,6 +58,13 @@ ShadowOptions shadow_default(void)
                            .size = 512}; // 1.2 mm a texel on long hair
 }
 
+ShadowOptions shadow_smaller(const ShadowOptions* key)
+{
+    ShadowOptions options = *key;
+    options.size = key->size / 2 > SHADOW_LEAST_SIZE ? key->size / 2 : SHADOW_LEAST_SIZE;
+    return options;
+}
+
 static void write_defines(Shadow* shadow)
 {
     snprintf(shadow->defines, SHADOW_DEFINES_BYTES, "#define SHADOWS %s\n#define LAYERS %d\n%s",

@@ -222,7 +222,7 @@ static void draw_calls_are_the_calls_made(void** state)
     stage_close(&stage);
 }
 
-// The passes of a picture, by their draw calls: update 1, shadow 2, light 1, shade 4.
+// The passes of a picture, by their draw calls: update 1, shadow 3, light 1, shade 4.
 static void shadows_stay_while_only_the_camera_moves(void** state)
 {
     (void)state;
@@ -231,21 +231,21 @@ static void shadows_stay_while_only_the_camera_moves(void** state)
         stage_open(&stage, "null", long_hair, small_picture(VIEW_SHADED), camera_default()));
     drawing_put_tick(&stage.view, long_hair, 0, 0, 0.0f);
     must_draw(&stage);
-    assert_int_equal(stage.drawing.draw_calls, 8);
+    assert_int_equal(stage.drawing.draw_calls, 9);
     CameraOptions camera = camera_default();
     camera.yaw_deg = 80;
     draw_set_camera(&stage.drawing, &camera);
     must_draw(&stage);
-    assert_int_equal(stage.drawing.draw_calls, 8 + 5);
+    assert_int_equal(stage.drawing.draw_calls, 9 + 5);
     draw_set_light(&stage.drawing, 10, 20);
     must_draw(&stage);
-    assert_int_equal(stage.drawing.draw_calls, 8 + 5 + 7);
+    assert_int_equal(stage.drawing.draw_calls, 9 + 5 + 8);
     must_draw(&stage);
-    assert_int_equal(stage.drawing.draw_calls, 8 + 5 + 7);
+    assert_int_equal(stage.drawing.draw_calls, 9 + 5 + 8);
     stage.view.pose.orientation = quat_normalise((Quat){0, 0.3, 0, 1});
     drawing_put_tick(&stage.view, long_hair, 1, 0, 0.0f);
     must_draw(&stage);
-    assert_int_equal(stage.drawing.draw_calls, 8 + 5 + 7 + 8);
+    assert_int_equal(stage.drawing.draw_calls, 9 + 5 + 8 + 9);
     stage_close(&stage);
 }
 
