@@ -27,7 +27,7 @@ typedef struct Frame {
     float rotation[9];           // of the head, row-major
     Box bounds;                  // what hair fills now
     Box drawn;                   // what holds all that is drawn, at least
-    float lit_low_m, lit_high_m; // ... and from where to where along the key light
+    float lit_low_m, lit_high_m; // ... and from where to where along a light
 } Frame;
 
 CameraOptions camera_default(void);

@@ -11,6 +11,16 @@
 const char* const draw_pass_names[PASSES] = {"upload", "update", "shadow",
                                              "light",  "shade",  "read"};
 
+static bool create_shadows(Drawing* drawing, const ShadowOptions* options, Fault* fault)
+{
+    const Gl* gl = drawing->gl;
+    ShadowOptions smaller = shadow_smaller(options);
+    if (!shadow_create(&drawing->shadow, gl, options, drawing->fibres, fault)) return false;
+    for (int i = 0; options->all_lights && i < 2; ++i)
+        if (!shadow_create(&drawing->others[i], gl, &smaller, drawing->fibres, fault)) return false;
+    return true;
+}
+
 bool draw_create(Drawing* drawing, const Gl* gl, const ShadeOptions* options,
                  const CameraOptions* camera, Fault* fault)
 {
@@ -22,8 +32,7 @@ bool draw_create(Drawing* drawing, const Gl* gl, const ShadeOptions* options,
     drawing->fibres = fibres_create(gl, fault);
     ShadowOptions shadow = options->shadow;
     shadow.evaluated = update_paths[options->update].evaluated;
-    if (drawing->times != NULL && drawing->fibres != 0 &&
-        shadow_create(&drawing->shadow, gl, &shadow, drawing->fibres, fault) &&
+    if (drawing->times != NULL && drawing->fibres != 0 && create_shadows(drawing, &shadow, fault) &&
         light_create(&drawing->light, gl, &options->shading, &drawing->shadow, fault) &&
         shade_create(&drawing->shade, gl, options, &drawing->shadow, fault))
         return true;
@@ -38,6 +47,8 @@ void draw_free(Drawing* drawing)
     shade_free(&drawing->shade, gl);
     light_free(&drawing->light, gl);
     shadow_free(&drawing->shadow, gl);
+    for (int i = 0; i < 2; ++i)
+        shadow_free(&drawing->others[i], gl);
     gl->DeleteTextures(1, &drawing->fibres);
     free(drawing->times);
     memset(drawing, 0, sizeof *drawing);
@@ -79,13 +90,13 @@ void draw_set_light(Drawing* drawing, float yaw_deg, float pitch_deg)
     drawing->lit = true;
 }
 
-// What the hair fills, head-relative world axes and along the key light: the guides of the newest
-// rows, widened by what strands stray from them.
-static void find_bounds(const Drawing* drawing, const GuidesView* view, Frame* frame)
+// What the hair fills, head-relative world axes and along a light: the guides of the newest rows,
+// widened by what strands stray from them.
+static void find_bounds(const Drawing* drawing, const GuidesView* view, Vec3 light, Frame* frame)
 {
     const Hairstyle* style = drawing->hair.style;
     const float *r = frame->rotation, margin_m = 0.03f;
-    Vec3 key = drawing->shade.lights.key, margin = {margin_m, margin_m, margin_m};
+    Vec3 margin = {margin_m, margin_m, margin_m};
     Box box = {vec3(1e9f, 1e9f, 1e9f), vec3(-1e9f, -1e9f, -1e9f)};
     float low = 1e9f, high = -1e9f;
     for (int row = 0; row < style->guide_count; ++row) {
@@ -99,8 +110,8 @@ static void find_bounds(const Drawing* drawing, const GuidesView* view, Frame* f
                      r[6] * p.x + r[7] * p.y + r[8] * p.z);
             box.low = vec3_min(box.low, p);
             box.high = vec3_max(box.high, p);
-            low = fminf(low, vec3_dot(p, key));
-            high = fmaxf(high, vec3_dot(p, key));
+            low = fminf(low, vec3_dot(p, light));
+            high = fmaxf(high, vec3_dot(p, light));
         }
     }
     frame->bounds = (Box){vec3_sub(box.low, margin), vec3_add(box.high, margin)};
@@ -176,9 +187,18 @@ static void begin_frame(Drawing* drawing, const GuidesView* view)
 static void run_shadow(Drawing* drawing, const GuidesView* view)
 {
     PassClock began = begin_pass(drawing);
-    find_bounds(drawing, view, &drawing->frame);
-    drawing->draw_calls += shadow_run(&drawing->shadow, drawing->gl, &drawing->hair,
-                                      drawing->shade.lights.key, &drawing->frame);
+    const Gl* gl = drawing->gl;
+    const Lights* lights = &drawing->shade.lights;
+    const Vec3 others[2] = {lights->fill, lights->rim};
+    Frame frame = drawing->frame; // the picture's own keeps the key light's bounds
+    for (int i = 0; drawing->options.shadow.all_lights && i < 2; ++i) {
+        find_bounds(drawing, view, others[i], &frame);
+        drawing->draw_calls +=
+            shadow_run(&drawing->others[i], gl, &drawing->hair, others[i], &frame);
+    }
+    find_bounds(drawing, view, lights->key, &drawing->frame);
+    drawing->draw_calls +=
+        shadow_run(&drawing->shadow, gl, &drawing->hair, lights->key, &drawing->frame);
     end_pass(drawing, PASS_SHADOW, began);
 }
 
@@ -187,14 +207,16 @@ static void run_shade(Drawing* drawing, const GuidesView* view)
     const Gl* gl = drawing->gl;
     const Frame* frame = &drawing->frame;
     PassClock began = begin_pass(drawing);
-    light_run(&drawing->light, gl, &drawing->hair, &drawing->shadow, &drawing->shade.lights, frame,
-              drawing->options.view == VIEW_TRANSMITTANCE);
+    const Shadow* shadows[] = {&drawing->shadow, &drawing->others[0], &drawing->others[1]};
+    drawing->draw_calls +=
+        light_run(&drawing->light, gl, &drawing->hair, shadows, &drawing->shade.lights, frame,
+                  drawing->options.view == VIEW_TRANSMITTANCE);
     end_pass(drawing, PASS_LIGHT, began);
 
     began = begin_pass(drawing);
     sort_hair(drawing, view);
-    drawing->draw_calls += 1 + shade_run(&drawing->shade, gl, &drawing->hair, &drawing->shadow,
-                                         &drawing->light, frame);
+    drawing->draw_calls +=
+        shade_run(&drawing->shade, gl, &drawing->hair, &drawing->shadow, &drawing->light, frame);
     end_pass(drawing, PASS_SHADE, began);
 }
 

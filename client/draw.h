@@ -21,7 +21,8 @@ typedef struct Drawing {
     ShadeOptions options;
     CameraOptions camera;
     Shade shade;
-    Shadow shadow;
+    Shadow shadow;    // of the key light
+    Shadow others[2]; // of fill and rim, with ShadowOptions.all_lights
     Light light;
     GLuint fibres;
     Hair hair;

@@ -8,9 +8,11 @@ bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, con
                   Fault* fault)
 {
     memset(light, 0, sizeof *light);
-    char defines[SHADING_DEFINES_BYTES + SHADOW_DEFINES_BYTES];
+    char defines[SHADING_DEFINES_BYTES + SHADOW_DEFINES_BYTES + 32];
     shading_defines(shading, defines);
     strcat(defines, shadow->defines);
+    light->each = shadow->options.all_lights;
+    if (light->each) strcat(defines, "#define EACH_LIGHT\n");
     if (!shading_create(&light->shading, gl, shading, fault)) return false;
     light->program = program_build(gl, "fullscreen.vert", "light.frag", defines, fault);
     if (light->program == 0) return false;
@@ -95,8 +97,25 @@ void light_show(const Light* light, const Gl* gl)
     gl->ActiveTexture(GL_TEXTURE0);
 }
 
-void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
-               const Lights* lights, const Frame* frame, bool transmittance)
+// One light after another, each with its own shadows; their radiances add up in the targets.
+static int draw_each(const Light* light, const Gl* gl, const Shadow* const* shadows,
+                     const Lights* lights)
+{
+    const Vec3 directions[LIGHT_SKY] = {lights->key, lights->fill, lights->rim};
+    gl->BlendFunc(GL_ONE, GL_ONE);
+    for (int i = 0; i < LIGHT_SKY; ++i) {
+        if (i == 1) gl->Enable(GL_BLEND); // the first replaces what the last picture left
+        shadow_bind(shadows[i], gl, light->program);
+        program_uniform3(gl, light->program, "light_direction", directions[i]);
+        gl->Uniform1f(program_uniform(gl, light->program, "irradiance"), lights->strength[i]);
+        gl->DrawArrays(GL_TRIANGLES, 0, 3);
+    }
+    gl->Disable(GL_BLEND);
+    return LIGHT_SKY;
+}
+
+int light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* const* shadows,
+              const Lights* lights, const Frame* frame, bool transmittance)
 {
     shading_update(&light->shading, gl, &hair->material);
     gl->BindFramebuffer(GL_FRAMEBUFFER, light->framebuffer);
@@ -110,9 +129,11 @@ void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shado
     program_uniform3(gl, light->program, "tip_colour", hair->material.tip_colour);
     gl->Uniform1i(program_uniform(gl, light->program, "transmittance_only"), transmittance);
     lights_bind(lights, gl, light->program);
-    shadow_bind(shadow, gl, light->program);
+    shadow_bind(shadows[LIGHT_KEY], gl, light->program);
     shading_bind(&light->shading, gl, light->program);
     hair_bind_points(hair, gl);
     gl->BindVertexArray(light->vao);
+    if (light->each && !transmittance) return draw_each(light, gl, shadows, lights);
     gl->DrawArrays(GL_TRIANGLES, 0, 3);
+    return 1;
 }

@@ -24,10 +24,12 @@ typedef struct Lights {
 typedef struct Light {
     GLuint program, framebuffer, vao;
     Shading shading;
+    bool each;                     // a run for every light, with that light's shadows
     GLuint targets[LIGHT_TARGETS]; // RGBA16F, as wide as the update targets
     int rows;
 } Light;
 
+// `shadow`: of the key light.
 bool light_create(Light* light, const Gl* gl, const ShadingOptions* shading, const Shadow* shadow,
                   Fault* fault);
 void light_free(Light* light, const Gl* gl);
@@ -41,6 +43,8 @@ void lights_bind(const Lights* lights, const Gl* gl, GLuint program);
 void light_samplers(const Gl* gl, GLuint program);
 void light_show(const Light* light, const Gl* gl);
 
-// `transmittance`: instead, how much of the key light arrives.
-void light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* shadow,
-               const Lights* lights, const Frame* frame, bool transmittance);
+// `shadows` are those of key, fill and rim light; of the key alone where it was created without
+// ShadowOptions.all_lights. `transmittance`: instead, how much of the key light arrives. Returns
+// the draw calls.
+int light_run(Light* light, const Gl* gl, const Hair* hair, const Shadow* const* shadows,
+              const Lights* lights, const Frame* frame, bool transmittance);

@@ -36,6 +36,7 @@ enum {
     KEY_SHADOWS,
     KEY_SHADOW_SIZE,
     KEY_SHADOW_LAYERS,
+    KEY_SHADOW_LIGHTS,
     KEY_LOD,
     KEY_UPDATE,
     KEY_TICK,
@@ -97,6 +98,8 @@ static const struct argp_option arguments[] = {
      "texels across a shadow map: 64 to 1024 (default 512, fewer in pictures of small heads)", 0},
     {"shadow-layers", KEY_SHADOW_LAYERS, "N", 0,
      "planes of optical depth: 4 to 128 (opacity, default 16; layered, 32), 2 to 8 (deep, 4)", 0},
+    {"shadow-lights", KEY_SHADOW_LIGHTS, "NAME", 0,
+     "which cast shadows: key (default), or all: fill and rim too, by maps half as wide", 0},
     {"lod", KEY_LOD, "NAME", 0,
      "full (default), or close, medium, far: 7,800, 2,000 or 1,250 triangles of hair", 0},
     {"update", KEY_UPDATE, "NAME", 0,
@@ -299,6 +302,8 @@ static void parse_update(struct argp_state* state, const char* value, int* path)
     *path = choice(state, "update", value, names);
 }
 
+static const char* const shadow_lights[] = {"key", "all", NULL};
+
 static error_t parse_shadow(int key, char* value, struct argp_state* state, ShadowOptions* shadow)
 {
     switch (key) {
@@ -312,6 +317,9 @@ static error_t parse_shadow(int key, char* value, struct argp_state* state, Shad
         break;
     case KEY_SHADOW_LAYERS:
         shadow->layers = (int)integer(state, "shadow-layers", value, 1, SHADOW_MAX_LAYERS);
+        break;
+    case KEY_SHADOW_LIGHTS:
+        shadow->all_lights = choice(state, "shadow-lights", value, shadow_lights) == 1;
         break;
     default:
         return ARGP_ERR_UNKNOWN;

@@ -60,6 +60,13 @@ ShadowOptions shadow_default(void)
                            .follows = true};
 }
 
+ShadowOptions shadow_smaller(const ShadowOptions* key)
+{
+    ShadowOptions options = *key;
+    options.size = key->size / 2 > SHADOW_LEAST_SIZE ? key->size / 2 : SHADOW_LEAST_SIZE;
+    return options;
+}
+
 static void write_defines(Shadow* shadow)
 {
     snprintf(shadow->defines, SHADOW_DEFINES_BYTES, "#define SHADOWS %s\n#define LAYERS %d\n%s%s",

@@ -1,4 +1,4 @@
-// Shadow pass: how much of the key light hair and head let through.
+// Shadow pass: how much of a light hair and head let through.
 //
 // A method is a row of shadow_methods: a file here that draws what it needs from the light, and a
 // file of shaders/ with its two functions of a place, which shaders/transmittance.glsl calls. The
@@ -38,6 +38,7 @@ typedef struct ShadowOptions {
     ShadowFormat format;
     const ShadowTuning* tuning; // NULL: the row's
     bool evaluated;             // of update_paths: programs find ribbon points themselves
+    bool all_lights;            // fill and rim cast shadows too, by maps half as wide
 } ShadowOptions;
 
 // Texture units, with those of hair.h.
@@ -87,6 +88,8 @@ extern const ShadowMethod shadow_methods[]; // ended by a row without a name
 int shadow_find_method(const char* name);   // its row, or -1
 
 ShadowOptions shadow_default(void);
+// For fill or rim.
+ShadowOptions shadow_smaller(const ShadowOptions* key);
 bool shadow_create(Shadow* shadow, const Gl* gl, const ShadowOptions* options, GLuint fibres,
                    Fault* fault);
 void shadow_free(Shadow* shadow, const Gl* gl);

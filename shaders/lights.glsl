@@ -1,5 +1,4 @@
-// Key (shadowed), fill and rim (not: more than one shadowed light is left out on purpose), and a soft
-// sky.
+// Key (shadowed), fill and rim (on hair only with EACH_LIGHT), and a soft sky.
 uniform vec3 key_direction, fill_direction, rim_direction; // towards the light, unit
 uniform vec4 light_strength; // irradiance of the three, across their direction; radiance of the sky
 #define KEY  light_strength.x

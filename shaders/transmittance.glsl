@@ -1,4 +1,4 @@
-// How much of the key light arrives at a point: the one thing that shading asks of shadows. The method
+// How much of a light arrives at a point: the one thing that shading asks of shadows. The method
 // (client/shadow.h) gives hair_transmittance and hair_transmittance_wide; the head blocks wholly.
 #include SHADOWS
 #include "shadow_place.glsl"

@@ -302,19 +302,24 @@ static double region_error(const Image* ours, const Image* reference, const Imag
 typedef struct Method {
     const char *shading, *shadows;
     ShadingKind kind;
+    bool all_lights; // cast shadows
 } Method;
 
 static const Method methods[] = {
-    {"clay", "none", SHADING_CLAY},
-    {"clay", "depth", SHADING_CLAY},
-    {"clay", "opacity", SHADING_CLAY},
-    {"clay", "deep", SHADING_CLAY},
-    {"kajiya", "deep", SHADING_KAJIYA},
-    {"banks", "deep", SHADING_BANKS},
-    {"marschner", "none", SHADING_MARSCHNER},
-    {"marschner", "depth", SHADING_MARSCHNER},
-    {"marschner", "opacity", SHADING_MARSCHNER},
-    {"marschner", "deep", SHADING_MARSCHNER},
+    {"clay", "none", SHADING_CLAY, false},
+    {"clay", "depth", SHADING_CLAY, false},
+    {"clay", "opacity", SHADING_CLAY, false},
+    {"clay", "deep", SHADING_CLAY, false},
+    {"kajiya", "deep", SHADING_KAJIYA, false},
+    {"banks", "deep", SHADING_BANKS, false},
+    {"marschner", "none", SHADING_MARSCHNER, false},
+    {"marschner", "depth", SHADING_MARSCHNER, false},
+    {"marschner", "opacity", SHADING_MARSCHNER, false},
+    {"marschner", "deep", SHADING_MARSCHNER, false},
+    {"kajiya", "deep", SHADING_KAJIYA, true},
+    {"marschner", "depth", SHADING_MARSCHNER, true},
+    {"marschner", "opacity", SHADING_MARSCHNER, true},
+    {"marschner", "deep", SHADING_MARSCHNER, true},
 };
 
 // Everything that a row of the CSV is made from.
@@ -334,8 +339,8 @@ static void print_colour(const Pair* pair)
         add_tint(&ours, pair->ours->rgba + 4 * i, w);
         add_tint(&theirs, pair->reference.rgba + 4 * i, w);
     }
-    printf("%s,%s,%s,%s,%.2f", pair->picture->name, pair->picture->view, pair->method->shading,
-           pair->method->shadows, pair->ms);
+    printf("%s,%s,%s,%s,%s,%.2f", pair->picture->name, pair->picture->view, pair->method->shading,
+           pair->method->shadows, pair->method->all_lights ? "all" : "key", pair->ms);
     for (int c = 0; c < 3; ++c)
         printf(",%.4f,%.4f", ours.rgb[c] / ours.weight, ours.rgb[c] / theirs.rgb[c]);
     printf(",%.1f,%.1f,%.4f\n", peak_degrees(pair->ours, &pair->mask, pair->angles),
@@ -343,14 +348,32 @@ static void print_colour(const Pair* pair)
            region_error(pair->ours, &pair->reference, &pair->mask));
     fflush(stdout);
 }
+
+// In clay the traced head is white as well.
+static void whiten(HeadMesh* head)
+{
+    for (int p = 0; p < head->part_count; ++p) {
+        head->parts[p].albedo = vec3(0.8f, 0.8f, 0.8f);
+        head->parts[p].is_skin = false; // no scalp
+    }
+}
+
 static bool draw_pair(Pair* pair, const Scene* scene, const View* view, Fault* fault)
 {
     Vec3 albedo;
     ShadeOptions options = picture_options(pair->picture, &albedo);
     options.shading.kind = pair->method->kind;
     options.shadow.method = shadow_find_method(pair->method->shadows);
+    options.shadow.all_lights = pair->method->all_lights;
+    if (pair->method->all_lights) options.shading.wrap = 0.0f; // shadows are there for that
     scene->style->material.root_colour = scene->style->material.tip_colour = albedo;
-    if (!draw(pair->ours, scene, view, &options, &pair->ms, fault)) return false;
+    HeadMesh* head = &scene->style->head;
+    HeadPart parts[HAIRSTYLE_MAX_PARTS];
+    memcpy(parts, head->parts, sizeof parts);
+    if (pair->picture->is_clay) whiten(head);
+    bool drawn = draw(pair->ours, scene, view, &options, &pair->ms, fault);
+    memcpy(head->parts, parts, sizeof parts);
+    if (!drawn) return false;
     print_colour(pair);
     return true;
 }
@@ -384,7 +407,7 @@ static bool study_picture(const Picture* picture, const Scene* scene, Image* our
 
 static bool study_colour(const Scene* scene, Image* ours, Fault* fault)
 {
-    printf("picture,view,shading,shadows,ms,red,red_ratio,green,green_ratio,blue,blue_ratio,"
+    printf("picture,view,shading,shadows,lights,ms,red,red_ratio,green,green_ratio,blue,blue_ratio,"
            "peak_deg,reference_peak_deg,region_error\n");
     for (size_t i = 0; i < sizeof pictures / sizeof pictures[0]; ++i)
         if (!study_picture(&pictures[i], scene, ours, fault)) return false;

@@ -192,7 +192,8 @@ static void time_light(const Gl* gl, Scene* scene, Light* light, Case* one)
 {
     gl->Finish();
     int64_t began = base_monotonic_us();
-    light_run(light, gl, &scene->hair, &scene->shadow, &scene->lights, &scene->frame, false);
+    const Shadow* shadow = &scene->shadow;
+    light_run(light, gl, &scene->hair, &shadow, &scene->lights, &scene->frame, false);
     gl->Finish();
     one->light_ms = least(one->light_ms, (double)(base_monotonic_us() - began) * 1e-3);
 }
