@@ -177,6 +177,8 @@ static void begin_frame(Drawing* drawing, const GuidesView* view)
     frame->pixel_m =
         shade_pixel_angle(&drawing->shade, &frame->camera) * vec3_length(frame->camera.eye);
     if (shadow_resize(&drawing->shadow, frame)) drawing->lit = true;
+    for (int i = 0; drawing->options.shadow.all_lights && i < 2; ++i)
+        if (shadow_resize(&drawing->others[i], frame)) drawing->lit = true;
     quat_matrix(rotation, view->pose.orientation);
     for (int i = 0; i < 9; ++i) {
         if (frame->rotation[i] != rotation[i]) drawing->moved = true;
