@@ -88,7 +88,7 @@ static void choose_prices(Cases* cases)
     add(cases, "price", "d'Eon's M", options);
     options.fibre.norm = NORM_HALF;
     options.layout = LAYOUT_NALU;
-    add(cases, "price", "Nalu's tables", options);
+    add(cases, "price", "Nalu's", options);
 }
 
 // --- errors
