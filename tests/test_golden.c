@@ -203,34 +203,46 @@ static void flipped_tangents_are_rejected(void** state)
     expect_rejected(scene);
 }
 
-// The ribbon of which most points stand before all others in the middle of the picture: one that
-// somebody looks at.
+// Clip-space depth of head-space point `p` where it is in the middle of the picture, else a far
+// one.
+static float depth_in_middle(const Mat4* clip, const float r[9], const float* p)
+{
+    float w[3], c[4];
+    for (int k = 0; k < 3; ++k)
+        w[k] = r[3 * k] * p[0] + r[3 * k + 1] * p[1] + r[3 * k + 2] * p[2];
+    for (int k = 0; k < 4; ++k)
+        c[k] = clip->m[0][k] * w[0] + clip->m[1][k] * w[1] + clip->m[2][k] * w[2] + clip->m[3][k];
+    return fabsf(c[0]) < 0.5f * c[3] && fabsf(c[1]) < 0.5f * c[3] ? c[3] : 1e9f;
+}
+
+// The ribbon that shows most in the middle of the picture: the sum of its points' widths, each less
+// the deeper it lies behind the foremost of all. The foremost alone may be a tip that flies.
 static int foremost_ribbon(void)
 {
     const Hair* hair = &golden.drawing.hair;
+    const Ribbons* ribbons = &hair->ribbons;
     const ShadeOptions* shade = &golden.options.shade;
     Camera camera = camera_orbit(&golden.options.camera, hair->style,
                                  (float)shade->width / (float)shade->height);
     Mat4 clip = matrix_mul(&camera.projection, &camera.view);
-    int texels = hair->update.rows * UPDATE_WIDTH;
-    Texel* at = test_malloc((size_t)texels * sizeof *at);
+    Texel* at = test_malloc((size_t)(hair->update.rows * UPDATE_WIDTH) * sizeof *at);
     context->BindTexture(GL_TEXTURE_2D, hair->update.targets[UPDATE_POSITIONS]);
     context->GetTexImage(GL_TEXTURE_2D, 0, GL_RGBA, GL_FLOAT, at);
-    float rotation[9], nearest = 1e9f;
+    float rotation[9], nearest = 1e9f, shows = 0.0f, most = -1.0f;
     quat_matrix(rotation, golden.view.pose.orientation);
+    for (int i = 0; i < ribbons->point_count; ++i)
+        nearest = fminf(nearest, depth_in_middle(&clip, rotation, at[i]));
     int best = 0, ribbon = 0;
-    for (int i = 0; i < hair->ribbons.index_count; ++i) {
-        uint32_t vertex = hair->ribbons.indices[i];
-        if (vertex == RIBBONS_RESTART) ++ribbon;
-        if (vertex == RIBBONS_RESTART) continue;
-        const float *p = at[vertex / 2], *r = rotation;
-        float w[3], c[4];
-        for (int k = 0; k < 3; ++k)
-            w[k] = r[3 * k] * p[0] + r[3 * k + 1] * p[1] + r[3 * k + 2] * p[2];
-        for (int k = 0; k < 4; ++k)
-            c[k] = clip.m[0][k] * w[0] + clip.m[1][k] * w[1] + clip.m[2][k] * w[2] + clip.m[3][k];
-        bool is_inside = fabsf(c[0]) < 0.5f * c[3] && fabsf(c[1]) < 0.5f * c[3];
-        if (is_inside && c[3] < nearest) nearest = c[3], best = ribbon;
+    for (int i = 0; i < ribbons->index_count; ++i) {
+        uint32_t vertex = ribbons->indices[i];
+        if (vertex == RIBBONS_RESTART) {
+            if (shows > most) most = shows, best = ribbon;
+            shows = 0.0f;
+            ++ribbon;
+            continue;
+        }
+        const float* p = at[vertex / 2];
+        shows += p[3] * expf((nearest - depth_in_middle(&clip, rotation, p)) / 0.004f);
     }
     test_free(at);
     return best;
