@@ -31,8 +31,7 @@ float fibre_texels(vec3 place)
 float fibre_coverage(vec3 place, float fill)
 {
     float texels = fibre_texels(place);
-    float level = clamp(floor(log2(texels) + 0.5), 0.0, 4.0);
-    float rank = textureLod(fibre_ranks, place, level).r;
+    float rank = textureLod(fibre_ranks, place, 0.0).r; // a filter on a coarser level eats thin hair
     float soft = clamp(0.02 * texels, 0.02, 0.5);
     float sharp = clamp((rank - (1.0 - fill)) / soft + 0.5, 0.0, 1.0);
     return mix(sharp, fill, fibre_blur(texels));

@@ -1,5 +1,6 @@
 // The strands of hair-bench reference are the path tracer's: numbers, check strands and the sum of
 // all coordinates are those that ../shared/assets/reference/scene.json states.
+#include "client/draw.h"
 #include "messages/drawn.h"
 #include "tests/drawing.h"
 #include "tests/follow.h"
@@ -73,11 +74,86 @@ static void follow_style_holds_the_strands_of_the_path_traced_pictures(void** st
     hairstyle_destroy(style);
 }
 
+// Masks' files say that they are linear, so that reading them made sRGB codes of what they hold.
+static double linear(int code)
+{
+    double c = code / 255.0;
+    return c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
+}
+
+static double mask_pixels(const char* view)
+{
+    char path[300];
+    Image mask;
+    Fault fault = {""};
+    snprintf(path, sizeof path, DRAWING_ASSETS "reference/mask_%s.png", view);
+    if (!image_read_png(&mask, path, &fault)) fail_msg("%s", fault.text);
+    double sum = 0.0;
+    for (int i = 0; i < mask.width * mask.height; ++i)
+        sum += linear(mask.rgba[4 * i]);
+    image_free(&mask);
+    return sum;
+}
+
+static double drawn_pixels(const Gl* gl, const Hairstyle* style, float yaw_deg, float distance_m)
+{
+    ShadeOptions options = shade_default();
+    options.view = VIEW_COVERAGE;
+    CameraOptions camera = {.has_distance = true,
+                            .distance_m = distance_m,
+                            .yaw_deg = yaw_deg,
+                            .pitch_deg = 5.0f,
+                            .fov_deg = 45.0f};
+    Drawing drawing;
+    Image image;
+    Fault fault = {""};
+    GuidesView guides = drawing_view(style);
+    drawing_put_tick(&guides, style, 0, 0, 0.0f);
+    if (!image_create(&image, options.width, options.height, &fault) ||
+        !draw_create(&drawing, gl, &options, &camera, &fault) ||
+        !draw_set_style(&drawing, style, 1, 0, &fault) || !draw_picture(&drawing, &guides, &image))
+        fail_msg("%s", fault.text);
+    double pixels = draw_hair_pixels(&image);
+    draw_free(&drawing);
+    image_free(&image);
+    guides_view_free(&guides);
+    return pixels;
+}
+
+// Hairs of 0.08 mm radius, a tenth of a pixel: nothing is drawn thinner than a pixel, so what a
+// pixel is covered by must come from the strand textures.
+static void hairs_thinner_than_a_pixel_cover_what_the_masks_cover(void** state)
+{
+    (void)state;
+    static const struct {
+        const char* name;
+        float yaw_deg, distance_m;
+    } views[] = {{"front", 0, 0.7f},
+                 {"threequarter", 35, 0.7f},
+                 {"back", 180, 0.7f},
+                 {"backwide", 180, 1.0f}};
+    if (!drawing_has_assets()) skip();
+    Gl* gl = drawing_open("egl");
+    if (gl == NULL) skip();
+    Fault fault = {""};
+    Hairstyle* style = follow_style(DRAWING_ASSETS, &fault);
+    if (style == NULL) fail_msg("%s", fault.text);
+    for (size_t i = 0; i < sizeof views / sizeof views[0]; ++i) {
+        double ratio = drawn_pixels(gl, style, views[i].yaw_deg, views[i].distance_m) /
+                       mask_pixels(views[i].name);
+        print_message("%s: %+.1f %% of the mask\n", views[i].name, 100.0 * (ratio - 1.0));
+        assert_true(fabs(ratio - 1.0) < 0.05);
+    }
+    hairstyle_destroy(style);
+    gl_close(gl);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follow_random_is_the_pcg_hash_that_scene_json_tests),
         cmocka_unit_test(follow_style_holds_the_strands_of_the_path_traced_pictures),
+        cmocka_unit_test(hairs_thinner_than_a_pixel_cover_what_the_masks_cover),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
