@@ -3,6 +3,7 @@
 #include "client/replace.h"
 
 #include <errno.h>
+#include <math.h>
 #include <png.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,6 +40,12 @@ void image_free(Image* image)
 {
     free(image->rgba);
     *image = (Image){0};
+}
+
+double image_linear(uint8_t code)
+{
+    double c = code / 255.0;
+    return c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
 }
 
 void image_flip(Image* image)

@@ -16,6 +16,9 @@ typedef struct Image {
 bool image_create(Image* image, int width, int height, Fault* fault);
 void image_free(Image* image);
 
+// Linear light, 0 to 1, of an sRGB code (IEC 61966-2-1).
+double image_linear(uint8_t code);
+
 // Turns what glReadPixels wrote (bottom row first) the right way up, or back.
 void image_flip(Image* image);
 

@@ -39,10 +39,8 @@ static double percentile_99(float* values, size_t count)
 static void compare_light(Comparison* c, const Image* a, const Image* b, float* each)
 {
     double linear[256], squares = 0;
-    for (int i = 0; i < 256; ++i) {
-        double code = i / 255.0;
-        linear[i] = code <= 0.04045 ? code / 12.92 : pow((code + 0.055) / 1.055, 2.4);
-    }
+    for (int i = 0; i < 256; ++i)
+        linear[i] = image_linear((uint8_t)i);
     size_t count = (size_t)a->width * (size_t)a->height;
     for (size_t i = 0; i < count; ++i) {
         double most = 0;

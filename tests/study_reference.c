@@ -30,12 +30,6 @@ static const View views[] = {{"front", 0.0f, 0.7f},
                              {"back", 180.0f, 0.7f},
                              {"backwide", 180.0f, 1.0f}};
 
-static double linear(uint8_t code)
-{
-    double c = code / 255.0;
-    return c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
-}
-
 // Guides at rest, as a daemon would have sent them.
 static bool rest_view(GuidesView* view, const Hairstyle* style, Fault* fault)
 {
@@ -136,7 +130,7 @@ static void print_coverage(const char* view, int samples, const Image* ours, con
 {
     double sum = 0, wanted = 0, difference = 0, above = 0, wanted_above = 0;
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; ++i) {
-        double a = ours->rgba[4 * i + 3] / 255.0, b = linear(mask->rgba[4 * i]);
+        double a = ours->rgba[4 * i + 3] / 255.0, b = image_linear(mask->rgba[4 * i]);
         sum += a;
         wanted += b;
         difference += fabs(a - b);
@@ -246,7 +240,7 @@ typedef struct Tint {
 static void add_tint(Tint* tint, const uint8_t* rgba, double weight)
 {
     for (int c = 0; c < 3; ++c)
-        tint->rgb[c] += weight * linear(rgba[c]);
+        tint->rgb[c] += weight * image_linear(rgba[c]);
     tint->weight += weight;
 }
 
@@ -256,11 +250,12 @@ static double peak_degrees(const Image* image, const Image* mask, const float* a
 {
     double sum[BINS] = {0}, weight[BINS] = {0}, most = 0, middle = 0, share = 0;
     for (int i = 0; i < WIDTH * HEIGHT; ++i) {
-        if (isnan(angles[i]) || linear(mask->rgba[4 * i]) < 0.5) continue;
+        if (isnan(angles[i]) || image_linear(mask->rgba[4 * i]) < 0.5) continue;
         int bin = (int)(((double)angles[i] / M_PI + 0.5) * BINS);
         bin = bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;
         const uint8_t* p = image->rgba + 4 * (size_t)i;
-        sum[bin] += 0.2126 * linear(p[0]) + 0.7152 * linear(p[1]) + 0.0722 * linear(p[2]);
+        sum[bin] +=
+            0.2126 * image_linear(p[0]) + 0.7152 * image_linear(p[1]) + 0.0722 * image_linear(p[2]);
         weight[bin] += 1;
     }
     for (int b = 0; b < BINS; ++b) {
@@ -285,7 +280,7 @@ static double region_error(const Image* ours, const Image* reference, const Imag
             Tint a = {0}, b = {0};
             for (int i = 0; i < REGION * REGION; ++i) {
                 size_t at = 4 * (size_t)((y + i / REGION) * WIDTH + x + i % REGION);
-                double w = linear(mask->rgba[at]);
+                double w = image_linear(mask->rgba[at]);
                 add_tint(&a, ours->rgba + at, w);
                 add_tint(&b, reference->rgba + at, w);
             }
@@ -335,7 +330,7 @@ static void print_colour(const Pair* pair)
 {
     Tint ours = {0}, theirs = {0};
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; ++i) {
-        double w = linear(pair->mask.rgba[4 * i]);
+        double w = image_linear(pair->mask.rgba[4 * i]);
         add_tint(&ours, pair->ours->rgba + 4 * i, w);
         add_tint(&theirs, pair->reference.rgba + 4 * i, w);
     }

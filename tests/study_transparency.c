@@ -70,12 +70,6 @@ static bool open_view(Stage* stage, const Gl* gl, const View* view, const Method
     return stage_open(stage, gl, &hair, &options, &camera, fault);
 }
 
-static double to_linear(int code)
-{
-    double c = code / 255.0;
-    return c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
-}
-
 static uint8_t to_code(double linear)
 {
     double c = linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
@@ -87,7 +81,7 @@ static void shrink(Image* out, const Image* in)
 {
     double linear[256];
     for (int i = 0; i < 256; ++i)
-        linear[i] = to_linear(i);
+        linear[i] = image_linear((uint8_t)i);
     for (int i = 0; i < 4 * out->width * out->height; ++i) {
         int x = i / 4 % out->width * FINER, y = i / 4 / out->width * FINER, k = i % 4;
         double sum = 0;

@@ -647,13 +647,7 @@ static void stats_have_the_fixed_keys_and_true_counts(void** state)
 #define WITHIN    0.15 // of the mask's sum
 #define LEAST_IOU 0.75 // of pixels more than half covered
 
-// The masks are linear and say so (gAMA 1); reading a PNG converts to sRGB. Back to 0..255.
-static double linear(uint8_t code)
-{
-    double c = code / 255.0;
-    return 255.0 * (c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
-}
-
+// The masks are linear and say so (gAMA 1); reading a PNG converts to sRGB.
 static void check_mask(const char* name, float yaw_deg, const Hairstyle* style)
 {
     char path[300];
@@ -681,7 +675,7 @@ static void check_mask(const char* name, float yaw_deg, const Hairstyle* style)
     int64_t both = 0, either = 0;
     double ours = 0, theirs = 0;
     for (int i = 0; i < mask.width * mask.height; ++i) {
-        double a = stage.image.rgba[4 * i + 3], b = linear(mask.rgba[4 * i]);
+        double a = stage.image.rgba[4 * i + 3], b = 255.0 * image_linear(mask.rgba[4 * i]);
         ours += a / 255.0, theirs += b / 255.0;
         both += a > 127.5 && b > 127.5;
         either += a > 127.5 || b > 127.5;

@@ -75,12 +75,6 @@ static void follow_style_holds_the_strands_of_the_path_traced_pictures(void** st
 }
 
 // Masks' files say that they are linear, so that reading them made sRGB codes of what they hold.
-static double linear(int code)
-{
-    double c = code / 255.0;
-    return c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
-}
-
 static double mask_pixels(const char* view)
 {
     char path[300];
@@ -90,7 +84,7 @@ static double mask_pixels(const char* view)
     if (!image_read_png(&mask, path, &fault)) fail_msg("%s", fault.text);
     double sum = 0.0;
     for (int i = 0; i < mask.width * mask.height; ++i)
-        sum += linear(mask.rgba[4 * i]);
+        sum += image_linear(mask.rgba[4 * i]);
     image_free(&mask);
     return sum;
 }
